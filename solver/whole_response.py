@@ -19,13 +19,12 @@ from solver.model import BoolArray, ComplexArray, FloatArray, IntArray, ReducedM
 from solver.newton.run import Run
 from solver.outcome import Outcome, check
 from solver.presentation import NOT_IN_DATASETS, Presented, unit_of
-from solver.settings import Direction, SolverSettings
+from solver.settings import SMALL, Direction, SolverSettings
 from solver.stability.floquet import Multipliers, Stability, find_multipliers
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_LEAST_PART = 0.1  # of the first value: how far a curve may turn back
 _FEWEST_STEPS = 50  # of a curve without folds: enough for a drawing
 
 _Branch = tuple[list[State], list[int], Outcome, str]
@@ -131,7 +130,7 @@ def response_curve(
         branch: _Branch = [], [], start.outcome, start.message
     else:
         # a branch may turn back behind its start before it comes to the last value
-        back = max(2.0 * first - last, _LEAST_PART * first) if first > 0.0 else -np.inf
+        back = max(2.0 * first - last, SMALL * first) if first > 0.0 else -np.inf
         span = abs(last - first) / (SMOOTH_CHANGE * _FEWEST_STEPS)
         begun, run = replace(found, history=balance.history, parameter=float(first)), Run(settings.tolerance)
         arc = Arc(lambda parameter: Balance(path.joint_at(parameter), balance.history), path.slope, begun, span, run)

@@ -16,23 +16,18 @@ from solver.contact.coulomb import OTHER, friction_limit
 from solver.harmonic_balance.dlft import Evaluation
 from solver.model import BoolArray, FloatArray
 from solver.packing import packable
-from solver.settings import NEGLIGIBLE, ROUND_OFF
+from solver.settings import NEGLIGIBLE, ROUND_OFF, SMALL
 from solver.structure.fourier import build_basis
 from solver.structure.joint import Joint
 
 VIOLATION_LIMITS = {
     "penetration": 0.1,
-    "tension": 1e-3,
-    "cone_violation": 0.05,
-    "energy_error": 0.05,
-    "periodicity_error": 1e-3,
+    **dict.fromkeys(("cone_violation", "energy_error"), 0.05),
+    **dict.fromkeys(("tension", "periodicity_error"), SMALL),
 }
 """Limits of the violations. Largest ones of good states with 3 to 41 harmonics: penetration 0.08 (vibro-impact with one
-harmonic, which is far off, 0.13), cone 0.018, energy 0.01, others below 1e-6."""
-
-SMALL_WORK = 1e-3
-"""Fraction of a larger work to which the error of a smaller one is relative: slip work over the work of the excitation,
-energy over the elastic work. Slip work below this fraction of this fraction wears nothing."""
+harmonic, which is far off, 0.13; underplatform damper 0.04), cone 0.018, energy 0.01 (unstable ring 0.016), others
+below 1e-6."""
 
 
 @packable
@@ -47,7 +42,7 @@ class Certificate:
         largest normal force and friction limit. The Fejer kernel is positive and the friction cone is convex: so the
         overshoot of a truncated friction force, 18 % of its limit for any number of harmonics, is no violation.
     energy_error: work of the excitation, minus the work of the damping, minus the friction work of the slip as it
-        wears, over the largest of these works and, times `SMALL_WORK`, of the elastic work and of the work that the
+        wears, over the largest of these works and, times `SMALL`, of the elastic work and of the work that the
         excitation could do at most.
     periodicity_error: change of the tangential state over a period over the largest friction limit.
     response_error, wear_rate_error: estimated relative truncation errors, NaN where not estimated.
@@ -169,5 +164,5 @@ def _energy_error(joint: Joint, evaluation: Evaluation, flexed: FloatArray) -> f
     elastic = np.pi * float((_amplitude(evaluation.force_h) * _amplitude(flexed)).sum())
     # largest possible work of the excitation: away from a resonance its actual work is almost zero
     apparent = np.pi * float((_amplitude(load) * _amplitude(motion)).sum())
-    size = max(abs(excitation), abs(damping), abs(contact), dissipation, SMALL_WORK * max(elastic, apparent))
+    size = max(abs(excitation), abs(damping), abs(contact), dissipation, SMALL * max(elastic, apparent))
     return _relative(abs(excitation - damping - dissipation), size)

@@ -11,7 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
-from solver.accuracy.certificate import SMALL_WORK, certify
+from solver.accuracy.certificate import certify
 from solver.contact.coulomb import OTHER, SEPARATED, SLIP, STICK
 from solver.continuation.natural import ratchets, shake_down
 from solver.harmonic_balance.dlft import Evaluation
@@ -19,23 +19,30 @@ from solver.harmonic_balance.state import State, first_response, largest_respons
 from solver.model import BoolArray, ComplexArray, FloatArray
 from solver.newton.run import Run
 from solver.packing import packable
-from solver.settings import NEGLIGIBLE, ROUND_OFF, Resolution, SolverSettings, all_orders, samples_for
+from solver.settings import (
+    NEGLIGIBLE,
+    ROUND_OFF,
+    SMALL,
+    SMALL_SHARE,
+    Resolution,
+    SolverSettings,
+    all_orders,
+    samples_for,
+)
 from solver.structure.joint import Case, Joint
 
 HARMONIC_LEVELS = (1, 3, 5, 9, 13, 19, 27, 39, 55, 79, 115, 165, 235, 331, 469)
 """Highest harmonics between which "auto" chooses; the last two for comparison only. Without 7: for the dovetail at 212
 Hz 5 and 7 agree by chance (errors of the worn volume with 5, 7, 9: 1.9, 1.2, 0.1 %)."""
 
-FAINT_SHARE = 0.1
-"""Fraction of rtol: part of the slip work that may be creep."""
-
 CONTRACTED = 1e-2
 """Residual after two steps towards a longer series up to which the first of them does not count: it may be 15 times too
-long where the second is right (dovetail). The friction oscillators of `STEPS_SAFETY` often do not come so near; of one
-of them the solution with 27 harmonics is as wrong as that with 9."""
+long where the second is right (dovetail). The friction oscillators of `SCATTERED_SAFETY` often do not come so near; of
+one of them the solution with 27 harmonics is as wrong as that with 9."""
 
 SMALL_PEAK = 0.01
-"""Fraction of the largest peak: errors of smaller responses are relative to this fraction."""
+"""Fraction of the largest peak: errors of smaller responses are relative to this fraction. With a tenth of it blocks,
+waves and impacts are equal."""
 
 
 @packable
@@ -117,7 +124,7 @@ class ResolvedState:
 
     def at_rest(self, run: Run) -> ResolvedState:
         """The state with its sliding masses at rest: their creep is slip and would count as wear."""
-        fraction = FAINT_SHARE * self.case.settings.rtol
+        fraction = SMALL_SHARE * self.case.settings.rtol
         if not ratchets(self.joint, self.point.evaluation, fraction):
             return self
         return ResolvedState(self.case, shake_down(self.joint, self.point, fraction, run))
@@ -160,15 +167,15 @@ class ResolvedState:
             return UNKNOWN
         mine, its = self.response(), better.response()
         # slip work whose error has less weight: a fraction of the work of the excitation
-        least, work = better._least_response(), SMALL_WORK * max(self._input_work(), better._input_work())
+        least, work = better._least_response(), SMALL * max(self._input_work(), better._input_work())
         first = float(np.linalg.norm(mine - its)) / max(float(np.linalg.norm(its)), least)
         size = np.maximum(better.peaks, max(SMALL_PEAK * float(better.peaks.max(initial=0.0)), least))
         response = max(first, float((np.abs(self.peaks - better.peaks) / size).max(initial=0.0)))
         mine_slip, its_slip = (float(level.point.evaluation.slip_work.sum()) for level in (self, better))
-        if max(its_slip, mine_slip) <= SMALL_WORK * work:
+        if max(its_slip, mine_slip) <= SMALL * work:
             return Estimate(response, 0.0)
         # the wear rate cannot be more accurate than the motion that causes it
-        slip = max(its_slip, SMALL_WORK * work)
+        slip = max(its_slip, SMALL * work)
         return Estimate(response, max(first, abs(mine_slip - its_slip) / slip), slip / max(slip, work))
 
     def _least_response(self) -> float:

@@ -27,10 +27,8 @@ from numba.extending import register_jitable
 
 from solver.model import FloatArray, IntArray
 
-SEPARATED = 0
-STICK = 1
-SLIP = 2
-OTHER = 3  # of a law without these states
+# the last one: of a law without these states
+SEPARATED, STICK, SLIP, OTHER = range(4)
 
 Force = TypeVar("Force", float, FloatArray)
 

@@ -30,7 +30,7 @@ from solver.contact.elastic_pairs import MOST_PERIODS, Period, assemble, periodi
 from solver.contact.element import Tangents
 from solver.model import FloatArray, IntArray
 
-PARTS = 8  # parts of a step of a pair with two tangents
+PARTS = 8  # of a step of a pair with two tangents; half and twice as many: sliding mass and two masses are equal
 SAME_VELOCITY = 1e-13  # of the velocity that the force gives in a period: a smaller change is a periodic motion
 
 Pair = tuple[float, float]

@@ -24,24 +24,19 @@ from numba import njit
 from numba.extending import register_jitable
 
 from solver.model import FloatArray, IntArray
-from solver.settings import ROUND_OFF
+from solver.settings import NEGLIGIBLE, ROUND_OFF
 
 PARTS = 32
 """Parts of a path. Dovetail, 16 pairs that slide for 2.8e5 cycles, `rtol` 1e-2: 18.606, 18.607, 18.607, 18.610,
-18.611 mm3 with 512, 128, 32, 16, 8 parts."""
+18.611 mm3 with 512, 128, 32, 16, 8 parts. With 16 and 64 blocks, waves and impacts are equal."""
 
-MOST_PROJECTIONS = 50
-"""Most changes of the one or two discs of a projection; two or three are usual."""
+ROUNDS = 40
+"""Halvings of the part within which the discs get a common point: their common part is then as long as 1e-6 radii. Also
+most changes of the one or two discs of a projection; two or three are usual."""
 
-HALVINGS = 40
-"""Halvings of the part within which the discs get a common point: their common part is then as long as 1e-6 radii."""
-
-INSIDE = 1e-10
+INSIDE = 0.1 * ROUND_OFF
 """Distance of a place from the border of its discs over their radius: the march through the period then finds that the
 pair sticks. Well below the tolerance of the residual."""
-
-FLATTEST_CORNER = 1e-6
-"""Least sine of the angle between two borders of which a derivative of their corner is made."""
 
 NOTES = 18
 """Entries of a noted step: sample, other sample or -1, the derivatives (2, 3) of the place by the predicted forces at
@@ -161,7 +156,7 @@ def _follow(way: Way, state: FloatArray, notes: FloatArray) -> tuple[float, floa
         if slips:
             # the fraction of the path at which the discs come to have a common point
             slips, low, begin = False, along - 1.0 / PARTS, along
-            for _ in range(HALVINGS):
+            for _ in range(ROUNDS):
                 middle = 0.5 * (low + begin)
                 if _nearest(way, middle, x_1, x_2)[0]:
                     begin = middle
@@ -198,7 +193,7 @@ def _nearest(way: Way, along: float, x_1: float, x_2: float) -> tuple[bool, int,
         apart = (x_1 - discs[0, place]) ** 2 + (x_2 - discs[1, place]) ** 2
         if apart > radius * radius and np.sqrt(apart) - radius > violated:
             new, violated = place, np.sqrt(apart) - radius
-    for _ in range(MOST_PROJECTIONS):
+    for _ in range(ROUNDS):
         if new < 0:
             return True, one, other
         y_1, y_2 = x_1, x_2
@@ -281,9 +276,9 @@ def _project(
     note[1] = way.near[other]
     u_1, u_2 = (x_1 - c_1) / radius, (x_2 - c_2) / radius
     v_1, v_2 = (x_1 - discs[0, other]) / discs[2, other], (x_2 - discs[1, other]) / discs[2, other]
-    # discs that only just touch have a corner that moves at any speed
+    # discs that only just touch have a corner that moves at any speed: least sine of the angle between their borders
     area = u_1 * v_2 - u_2 * v_1
-    area = np.copysign(max(abs(area), FLATTEST_CORNER), area)
+    area = np.copysign(max(abs(area), NEGLIGIBLE), area)
     for place, moved, normal in ((2, (v_2, -v_1), (u_1, u_2)), (8, (-u_2, u_1), (v_1, v_2))):
         for row in range(2):
             push, start = along * moved[row] / area, place + 3 * row

@@ -8,28 +8,17 @@ from functools import cached_property
 
 import numpy as np
 
-from solver.continuation.natural import NEAR_ITERATIONS, SMOOTH_CHANGE
+from solver.continuation.natural import FINE_STEP, LARGEST_STEP_RATIO, NEAR_ITERATIONS, SMOOTH_CHANGE
 from solver.harmonic_balance.dlft import Balance, Evaluation, Linearisation
 from solver.harmonic_balance.state import State, state_of
 from solver.model import FloatArray
-from solver.newton.run import Bordered, Run
+from solver.newton.run import SHORTEST_STEP, Bordered, Run
 
 FIRST_ARC = SMOOTH_CHANGE / 10.0
 """Length of the first step, in unknowns over the norm of the first predicted force; the longest is `SMOOTH_CHANGE`."""
 
-CORNER_ARC = 1e-3
-"""Length of the step behind a corner, and least length after a step: without it seven branches with folds take 46 %
-more iterations."""
-
-SHORTEST_ARC = CORNER_ARC / 10.0
+SHORTEST_ARC = FINE_STEP / 10.0
 """Shortest step: where none of this length converges, the branch has a corner."""
-
-ARC_WANDER = 2.0
-"""Distance of a corrector from its start over the length of the step, above which the corrector is given up. Without it
-the branch of `tests/solver/test_whole_response.py` is left for another one."""
-
-FOLD_HALVINGS = 10
-"""Halvings of a step with a fold; the parameter at the fold is off by the square of the length."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +61,7 @@ class Arc:
             ahead = self.tangent(reached, self.place(reached) - self.place(state))
             turns = ahead is not None and ahead[-1] * tangent[-1] < 0.0
             yield state, reached, state if back else self._fold(state, tangent, reached) if turns else None
-            state, tangent, length = reached, ahead, max(length, CORNER_ARC)
+            state, tangent, length = reached, ahead, max(length, FINE_STEP)
 
     def place(self, state: State) -> FloatArray:
         """Scaled unknowns of a state."""
@@ -104,12 +93,12 @@ class Arc:
 
     def _step_over_corner(self, state: State, tangent: FloatArray) -> State | None:
         """State behind a corner, along the tangent a little ahead, with both signs; None where none is found."""
-        plane = _Plane(self, self.place(state), tangent, CORNER_ARC)
+        plane = _Plane(self, self.place(state), tangent, FINE_STEP)
         turned = self.tangent(self.state_of(plane.evaluate(*plane.first())), tangent)
         if turned is None:
             return None
         for sign in (1.0, -1.0):
-            reached = self.step(state, sign * turned, CORNER_ARC)
+            reached = self.step(state, sign * turned, FINE_STEP)
             if reached is None:
                 continue
             chord = self.place(reached) - plane.base
@@ -129,7 +118,8 @@ class Arc:
         """State with the extreme parameter between two states, by bisection of the length; tangent: at the first."""
         sign, low, high = np.sign(tangent[-1]), 0.0, float(tangent @ (self.place(after) - self.place(state)))
         best = max(state, after, key=lambda each: sign * each.parameter)
-        for _ in range(FOLD_HALVINGS):
+        shortest = SHORTEST_STEP * high  # the parameter is off by its square; with an eighth folds are equal
+        while high - low > shortest:
             place = 0.5 * (low + high)
             found = self.step(state, tangent, place)
             ahead = None if found is None else self.tangent(found, tangent)
@@ -167,5 +157,6 @@ class _Plane:
         return np.array([self.tangent[:-1] @ step.ravel() / self.arc.size])
 
     def fraction(self, here: Bordered, _: FloatArray) -> float:
-        far = np.linalg.norm(here.extra) > ARC_WANDER * abs(self.length)
+        # without it the branch of `tests/solver/test_whole_response.py` is left for another one
+        far = np.linalg.norm(here.extra) > LARGEST_STEP_RATIO * abs(self.length)
         return np.nan if far else 1.0

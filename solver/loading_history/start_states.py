@@ -21,9 +21,10 @@ from solver.accuracy.refinement import refine
 from solver.accuracy.resolved_state import UNKNOWN, ResolvedState
 from solver.clock import computing_time
 from solver.continuation.first_state import solve_first_state
+from solver.continuation.natural import FINE_STEP
 from solver.continuation.phase_lag import phase_lag, solve_at_lag, solve_at_peak
 from solver.harmonic_balance.state import Failure, State, balance_after
-from solver.loading_history.path import FREE_STEP, LoadingPath, Path, Step, cell_of, edge_of, first_frequency
+from solver.loading_history.path import LoadingPath, Path, Step, cell_of, edge_of, first_frequency
 from solver.loading_history.sweep import NODE_ITERATIONS, SWEEP_ITERATIONS, Sweep
 from solver.model import FloatArray, ReducedModel
 from solver.newton.run import Budget, Run, guarded
@@ -31,14 +32,14 @@ from solver.outcome import Outcome, describe_inaccurate
 from solver.packing import Packed, pack, unpack
 from solver.results.history import StartState
 from solver.results.state_report import evaluated, periodic_state
-from solver.settings import Direction, FollowedFrequency, Resolution, SolverSettings, allowed
+from solver.settings import FEWEST_SAMPLES, Direction, FollowedFrequency, Resolution, SolverSettings, allowed
 from solver.stability.floquet import find_instability
 from solver.structure.joint import Case, build_case
 
 FIRST_ITERATIONS = SWEEP_ITERATIONS // 8
 """Most Newton iterations to begin a sweep, or to find a state where the sweep is lost. Tens to hundreds suffice."""
 
-OTHER_START = Resolution((1,), 64)
+OTHER_START = Resolution((1,), FEWEST_SAMPLES)
 """Harmonics and samples of a further attempt to find a first state: four of 54 random scenes need it."""
 
 
@@ -140,7 +141,7 @@ class FrequencySweep:
                 return present
         present = self._new_sweep(cell, ramp)
         present.budget.most_iterations = FIRST_ITERATIONS
-        place = 2.0 * np.pi * first_frequency(self.model, cell, self.direction) if ramp is None else FREE_STEP
+        place = 2.0 * np.pi * first_frequency(self.model, cell, self.direction) if ramp is None else FINE_STEP
         present.budget.report(f"first state at {(ramp or place) / (2.0 * np.pi):.6g} Hz")
         first = self._first(present.path, place, present.run)
         if isinstance(first, Failure):
@@ -292,7 +293,7 @@ def _resonance_between(
         # none, or another resonance
         found = None
     for fold in step.folds:
-        before_fold = (fold - omega) * present.sign > FREE_STEP * fold
+        before_fold = (fold - omega) * present.sign > FINE_STEP * fold
         if found is None or not before_fold or not run.is_stable(found.balance.joint, found.at):
             way = f'give sweep = "{"down" if sweeps.direction == "up" else "up"}"'
             over = f"the sweep {sweeps.direction} jumps over the resonance at {fold / (2.0 * math.pi):.6g} Hz"

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import scipy.linalg
 
+from solver.accuracy.refinement import DIFFERENCE_SAFETY
 from solver.clock import computing_time
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import Failure
@@ -20,7 +21,6 @@ from solver.results.history import StartState, first_cut_off
 from solver.results.state_report import evaluated, periodic_state
 from solver.settings import Direction, Passage
 from solver.structure.joint import Case, build_case
-from solver.wear.errors import HISTORY_SAFETY
 from solver.wear.problem import WearProblem, reference_of
 from solver.wear.slow_time import Guide, Integrator
 from solver.wear.step import rate_slope
@@ -140,7 +140,7 @@ def run_block(given: BlockInput) -> BlockResult | Failure:
         rates = rate_slope(problem, state, given.depth + depth[-1] > 0.0)
         slope = np.asarray(scipy.linalg.expm(counts[-1] * rates) - np.eye(len(rates)))
     # the errors of the first steps of the blocks have one sign and add up over the missions
-    by_steps = HISTORY_SAFETY * float(values["local"][-1]) / volume if volume > 0.0 else 0.0
+    by_steps = DIFFERENCE_SAFETY * float(values["local"][-1]) / volume if volume > 0.0 else 0.0
     motion, force, history = state.at.displacement_h, state.at.force_h, state.point.history
     return BlockResult(
         growth=depth[-1],

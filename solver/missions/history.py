@@ -20,13 +20,9 @@ from solver.newton.run import Run, guarded
 from solver.outcome import Outcome, absolute, known_to
 from solver.packing import Packed, packable
 from solver.results.history import StartState, describe_cut_off, describe_uncertain, last_error, verdict
-from solver.settings import Passage
+from solver.settings import SHARE_OF_CAUSE, Passage
 from solver.wear.errors import Compared, HistoryError, compare, reach_target
 from solver.wear.slow_time import RTOL_RATIO, Course, Guide, Integrator, Node, Solution
-
-STEP_ERROR_FRACTION = 0.5
-"""Share of rtol in `allowed_error`. Slider: estimated over true error at least 1.7. With 0.25 two cases of the tests
-compute 21.5 and 33 of 2000 missions, with 0.5 fewer than 20 and 30."""
 
 
 @packable
@@ -106,7 +102,7 @@ class MissionProblem:
         nodes, rtol = here[1].nodes, self.mission.settings.rtol * (1.0 if self.history is None else RTOL_RATIO)
         number = int(nodes[-1].count + length)
         run_mission = partial(self._mission, here[0], number, number in self._tested)
-        step = attempt_step(nodes, int(length), self.mission.area, run_mission, STEP_ERROR_FRACTION * rtol)
+        step = attempt_step(nodes, int(length), self.mission.area, run_mission, SHARE_OF_CAUSE * rtol)
         if isinstance(step, MissionStep):
             return step
         self._failure = step

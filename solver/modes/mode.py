@@ -18,10 +18,10 @@ from solver.accuracy.refinement import refine
 from solver.accuracy.resolved_state import NOTHING, Estimate, ResolvedState, shifted
 from solver.contact.coulomb import SEPARATED, STICK, friction_limit
 from solver.continuation.first_state import RELIEF, relieved_history, state_at_rest
-from solver.continuation.natural import LARGEST_STEP_RATIO, NEAR_ITERATIONS
+from solver.continuation.natural import FINE_STEP, LARGEST_STEP_RATIO, NEAR_ITERATIONS
 from solver.harmonic_balance.dlft import Balance, Linearisation
 from solver.harmonic_balance.state import Failure, State, state_of
-from solver.loading_history.path import FREE_STEP, LINEAR_CHANGE, Path
+from solver.loading_history.path import Path
 from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.modes.modal_model import LinearMode, linear_mode, modal_model
 from solver.newton.run import MOST_ITERATIONS, Bordered, Run
@@ -33,14 +33,12 @@ from solver.structure.fourier import from_complex
 from solver.structure.joint import Case, Joint, build_case
 
 FIRST_AMPLITUDE = 1e-6
-"""First amplitude of a joint without static normal forces, m sqrt(kg)."""
+"""First amplitude of a joint without static normal forces, m sqrt(kg). With 1e-3 the mode of an oscillator with a wall
+is equal and takes 2 % more iterations."""
 
-TOP_BASE = 4.0
+TOP_BASE = LARGEST_STEP_RATIO**2
 """Amplitudes are lowered from a power of this number, at least twice the amplitude of the point: all points with one
-such power have one way. With 8 the mode of the foot is equal to 1e-8."""
-
-SLIDING_STARTS = 4
-"""Attempts to find a mode of a sliding joint, each at an amplitude higher by `TOP_BASE`. The slider may need two."""
+such power have one way. With 8 the mode of the foot is equal to 1e-8, that of the slider to 1e-13."""
 
 
 @packable
@@ -73,7 +71,7 @@ class NonlinearMode(Path[ModeState]):
     model: ReducedModel
     linear: LinearMode
     # where a smaller ratio is needed the mode is lost; with a tenth of it modes are equal
-    shortest: ClassVar[float] = FREE_STEP
+    shortest: ClassVar[float] = FINE_STEP
     longest: ClassVar[float] = math.log(LARGEST_STEP_RATIO)
 
     def case_of(self, values: FloatArray) -> Case:
@@ -133,7 +131,7 @@ class NonlinearMode(Path[ModeState]):
 
     def change(self, before: ModeState, after: ModeState) -> float:  # noqa: D102
         sticks = all((state.evaluation.status_t == STICK).all() for state in (before, after))
-        return self.differs(before, after) / (LINEAR_CHANGE if sticks else self.largest_change())
+        return self.differs(before, after) / (1.0 if sticks else self.largest_change())
 
     def differs(self, before: ModeState, after: ModeState) -> float:
         """As in Path: of the vibrating predicted force per amplitude."""
@@ -247,7 +245,7 @@ class Rest:
         case, normal_force = self.mode.case, self.state.evaluation.force_h[:, 0, 0]
         limit = np.linalg.norm(friction_limit(case.model.contact.friction, normal_force))
         force = np.linalg.norm(case.joint(self.mode.linear.omega, 1.0).structure.force_h[:, 1:])
-        return float(FREE_STEP * limit / force) if limit > 0.0 and force > 0.0 else FIRST_AMPLITUDE
+        return float(FINE_STEP * limit / force) if limit > 0.0 and force > 0.0 else FIRST_AMPLITUDE
 
     def raised(self, amplitude: float, run: Run) -> ModeState | None:
         """The mode at a small amplitude, m sqrt(kg), from rest or from smaller static friction forces; None if none."""
@@ -256,15 +254,15 @@ class Rest:
         start = self.state.evaluation.predicted_h.copy()
         start[:, 1:] = joint.structure.force_h[:, 1:]
         values = np.array([linear.omega, linear.damping_ratio, amplitude])
-        histories = (relieved_history(joint, self.state, fraction) for fraction in (0.0, *RELIEF))
+        histories = (relieved_history(joint, self.state, fraction) for fraction in (0.0, RELIEF))
         found = (self.mode.find(amplitude, (start, values), history, run.fresh()) for history in histories)
         return next((node for node in found if node is not None), None)
 
     def sliding(self, amplitude: float, run: Run) -> ModeState | None:
         """The mode at a large amplitude, at which the joint slides as in its linear mode; None where not found."""
         linear, dofs = self.mode.linear, self.mode.model.contact.dofs
-        for attempt in range(SLIDING_STARTS):
-            size = amplitude * TOP_BASE**attempt
+        # the slider may need the second one
+        for size in (amplitude, TOP_BASE * amplitude):
             joint = self.mode.case.joint(linear.omega, size)
             amplitudes = np.zeros((dofs.size, len(joint.basis.orders)), complex)
             amplitudes[:, 0] = np.where(dofs.ravel() >= 0, size * linear.shape[dofs.ravel()], 0.0)

@@ -13,6 +13,7 @@ from typing import Literal, cast
 import numpy as np
 
 from solver.accuracy.certificate import certify
+from solver.accuracy.refinement import DIFFERENCE_SAFETY
 from solver.accuracy.resolved_state import shifted
 from solver.clock import computing_time
 from solver.contact.coulomb import SEPARATED, SLIP
@@ -27,10 +28,6 @@ from solver.outcome import Ended, Outcome, known_to
 from solver.settings import ROUND_OFF, Resolution, SolverSettings
 
 Direction = Literal["up", "down"]
-
-ERROR_OVER_CHANGE = 1.5
-"""Error of frequency and damping over their change with more harmonics and samples. Estimated over true errors: mass on
-a rigid slider at least 1.2, oscillator with a wall 1.4, pressed foot that begins to slip 0.5, dovetail 2."""
 
 _NO_FIRST = Failure(Outcome.START_FAILED, "the mode was not found at its first amplitude")
 
@@ -219,7 +216,7 @@ def _errors_by_resolution(mode: NonlinearMode, state: ModeState, run: Run) -> Fl
         if found is None and (near := between.moved(state, run)) is not None:
             found = wanted.moved(near, run)
         if found is not None:
-            return ERROR_OVER_CHANGE * np.abs(found.values - state.values)
+            return DIFFERENCE_SAFETY * np.abs(found.values - state.values)
     return np.full(3, math.inf)
 
 

@@ -14,16 +14,14 @@ import scipy.linalg
 from scipy.linalg.blas import dgemv, dnrm2
 
 from solver.model import ComplexArray, FloatArray
-from solver.settings import NEGLIGIBLE
+from solver.settings import NEGLIGIBLE, ROUND_OFF
 
 SIGN_PRODUCTS = 16
 """Products of Arnoldi's method between two computations of the eigenvalues. With four, 23 cases are equal."""
 
 STAGNATION_PRODUCTS = 20
-"""GMRES ends unless its residual is halved over so many products: saves time where a joint slides."""
-
-NO_DIRECTION = 1e-11
-"""Fraction of a vector: less is no new direction. Double precision has 2e-16."""
+"""GMRES ends unless its residual is halved over so many products: saves time where a joint slides. With 25 dovetail and
+underplatform damper are equal to 1e-6 and take as many iterations; with 10 the damper takes 23 % more."""
 
 Product = Callable[[FloatArray], FloatArray]
 """An operator applied to a vector (n,)."""
@@ -129,7 +127,7 @@ def _extend(basis: FloatArray, k: int, image: FloatArray) -> FloatArray:
         left = left - dgemv(1.0, there, components)
     rest = dnrm2(left)
     # the negation also ends at what is not a number
-    if not rest <= NO_DIRECTION * dnrm2(image):
+    if not rest <= ROUND_OFF * dnrm2(image):
         column[k + 1] = rest
         basis[k + 1] = left / rest
     return column

@@ -15,43 +15,51 @@ from solver.harmonic_balance.dlft import Linearisation
 from solver.model import ComplexArray, FloatArray, IntArray
 from solver.newton.krylov import build_correction, ritz_values, solve_gmres
 from solver.newton.period_preconditioner import PeriodFactor, build_period_factor
-from solver.settings import Resolution
+from solver.settings import SMALL, Resolution, SolverSettings
 
-FORCING = 1e-3
-"""Relative residual of a Newton direction. With half and twice this value the dovetail is equal to 1e-6."""
+FORCING = SMALL
+"""Relative residual of a Newton direction. With half and twice this value the dovetail is equal to 1e-6, the damper to
+5e-8."""
 
 REUSE_PRODUCTS = 25
 """Most products of a solve with an earlier factorisation, before a new one is built, which takes as long as 20 products
-with 48 pairs. Histories of 16 and 48 pairs take equal times, within 10 %, with 12 to 80."""
+with 48 pairs. Histories of 16 and 48 pairs take equal times, within 10 %, with 12 to 80. With 12 and 50 the damper is
+equal to 5e-8."""
 
 MOST_CORRECTED = 60
 """Most directions in which a factorisation is corrected. With 0, 60, 120: 17.4, 12.0, 11.4 products of a solve and 52,
-42, 42 CPU s with 160 pairs; 6.3, 6.0, 6.0 s with 48."""
+42, 42 CPU s with 160 pairs; 6.3, 6.0, 6.0 s with 48. With 80 dovetail and underplatform damper are equal to 1e-6."""
 
 FEWEST_CORRECTED = 3
-"""Fewest products of a solve that a correction is made of. With 1, two histories of 44 under random loads (16 pairs,
-1 N) lose their branch early, 21 and 46 mm3 worn for 107 and 239; with 1, 3, 6 usual ones are equally fast."""
+"""Fewest products of a solve that a correction is made of. With 1, two histories of 44 under random loads (16 pairs, 1
+N) lose their branch early, 21 and 46 mm3 worn for 107 and 239; with 1, 3, 6 usual ones are equally fast; with 2 and 6
+the damper is equal to 5e-8."""
 
 MOST_PRODUCTS = 80
-"""Most products of a solve, and of Arnoldi's method: at 160 pairs, eigenvalues at 0.01 converge with 32."""
+"""Most products of a solve, and of Arnoldi's method: at 160 pairs, eigenvalues at 0.01 converge with 32. With 40 and
+160 the dovetail is equal to 5e-7, waves within 2e-3."""
 
 SETTLED = 0.1
 """Residual over modulus of an eigenvalue below which its sign is known, and real part above which an eigenvalue is
-certainly positive (all are 1 for an exact factorisation). With 0.15 for the real part the same cases are equal."""
+certainly positive (all are 1 for an exact factorisation). With 0.05 and 0.15 dovetail, waves and blocks are judged
+alike."""
 
 DENSE_UNKNOWNS = 200
-"""Unknowns up to which a Jacobian is factorised at each solve. With 100 and 400, 16 and 48 pairs take equal times."""
+"""Unknowns up to which a Jacobian is factorised at each solve. With 100 and 400, 16 and 48 pairs take equal times;
+spheres and blocks are equal to 2e-7."""
 
 LARGEST_DENSE = 3000
 """Largest number of unknowns of a factorisation: 72 MB and 0.6 s. Above, the highest harmonics are left out."""
 
 SMALL_JOINT = 40
 """Relative displacements up to which a joint is small and its Jacobian is factorised: impacts couple most harmonics,
-and products with any other factorisation are in vain (three pairs with 115 harmonics in the tests)."""
+and products with any other factorisation are in vain (three pairs with 115 harmonics in the tests). With 80 the
+stability of a ring is not known."""
 
-NEUTRAL_SHIFT = 1e-8
+NEUTRAL_SHIFT = SolverSettings.tolerance
 """Shift of the eigenvalues, which are 1 for a pair that sticks, where the sign of the determinant counts. The position
-of a joint that slips as a whole is arbitrary: round-off in a zero eigenvalue would give the determinant any sign."""
+of a joint that slips as a whole is arbitrary: round-off in a zero eigenvalue would give the determinant any sign. With
+a tenth a shroud wears as much within 1e-5, and the error of a block that comes loose is told six times as large."""
 
 
 @dataclass(frozen=True)

@@ -32,7 +32,9 @@ from solver.structure.condensation import CACHED_STRUCTURES, CondensedStructure
 from solver.structure.fourier import FourierBasis, build_basis
 from solver.structure.joint import Joint
 
-MARCH_PERIODS = 2  # slip removes the influence of the start
+MARCH_PERIODS = 2
+"""Periods of a march: slip removes the influence of the start. With one and three ring and damper are equal to 2e-6."""
+
 SingleArray = NDArray[np.float32]
 
 

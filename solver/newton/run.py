@@ -24,15 +24,18 @@ from solver.structure.fourier import build_basis
 from solver.structure.joint import Case, Joint
 
 MOST_ITERATIONS = 30
-"""Most iterations of one solve: 2 to 5 are needed from a near state."""
+"""Most iterations of one solve: 2 to 5 are needed from a near state. With 20 and 60 slider, blocks, waves and impacts
+are equal."""
 
 FULL_STEPS = 6
-"""Full steps in a row without a new lowest residual before steps are halved. Half and twice as many: equal states."""
+"""Full steps in a row without a new lowest residual before steps are halved. Half and twice as many: equal states, and
+up to 20 % more iterations with impacts."""
 
 SHORTEST_STEP = 1.0 / 128.0
 """Shortest step as a fraction of the full step: seven halvings. With six one of 60 random scenes gets no accurate
 state. Also the shortest natural step over the range to the target, the shortest Euler step on the slow time over the
-wanted one, and the shortest relaxation step in periods."""
+wanted one, and the shortest relaxation step in periods; and the length to which a
+fold is located over that of the step with it."""
 
 SAMPLES_OF_SIGN = 16
 """Samples over those of a state that is unstable with fewer: the sign of the determinant may turn where many pairs slip

@@ -11,10 +11,7 @@ from solver.outcome import SENSITIVE_ERROR, Ended, Outcome, in_digits, known_to
 from solver.packing import packable
 from solver.presentation import Presented
 from solver.settings import NEGLIGIBLE, Resolution
-
-HELD_FORCE = 1e-5
-"""Fraction of the friction of all pairs that a hold of the mean position takes up at most. Motion and wear change by
-this fraction at most, far below any rtol. Dovetail, friction 0.3, 1 N: 5e-7 to 2e-6 after 20 000 cycles."""
+from solver.structure.penalty import HOLD_FRACTION
 
 
 @packable
@@ -177,7 +174,7 @@ def judge(history: WearHistory, rows: IntArray, rtol: float, slower: float = 1.0
     if math.inf > history.held_from <= at:
         held = (
             f"from cycle {in_digits(history.held_from / slower)} on every pair slips and only friction holds the joint"
-            f" in one direction: its mean position is held there, by at most {HELD_FORCE:g} of the friction"
+            f" in one direction: its mean position is held there, by at most {HOLD_FRACTION:g} of the friction"
         )
     most = rtol if history.adaptive else math.inf
     outcome, message = verdict(error, most, uncertain, inaccurate, cut_off, held, history.unjudged)

@@ -18,11 +18,10 @@ from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.state import Failure, vibration_change
 from solver.model import FloatArray
 from solver.outcome import Outcome, in_digits
-from solver.results.history import HELD_FORCE
 from solver.settings import NEGLIGIBLE, ROUND_OFF
 from solver.stability.floquet import OTHER_BRANCH
 from solver.structure.joint import Hold, Joint
-from solver.structure.penalty import MEAN_STIFFNESS_FRACTION
+from solver.structure.penalty import HOLD_FRACTION
 from solver.wear.wearing_joint import Steps, WearingJoint, WearState
 
 
@@ -88,10 +87,10 @@ def free_slide(joint: Joint, at: Evaluation, *, drifts: bool = False) -> Hold | 
     if np.count_nonzero(free) != 1 or closes > NEGLIGIBLE:
         return None
     motion = joint.to_relative(at.displacement_h)[:, 0]
-    return Hold(along, MEAN_STIFFNESS_FRACTION * float(stiffness[-1]), float(along @ motion))
+    return Hold(along, HOLD_FRACTION * float(stiffness[-1]), float(along @ motion))
 
 
 def creeps(joint: Joint, hold: Hold, at: Evaluation) -> bool:
     """Whether the force of a hold is so large that the joint would creep noticeably without it."""
     friction = float(joint.contact.friction @ at.force_h[:, 0, 0])
-    return abs(hold.force(joint.to_relative(at.displacement_h)[:, 0])) > HELD_FORCE * friction
+    return abs(hold.force(joint.to_relative(at.displacement_h)[:, 0])) > HOLD_FRACTION * friction

@@ -16,19 +16,21 @@ import numpy as np
 from solver.accuracy.certificate import Certificate
 from solver.clock import computing_time
 from solver.harmonic_balance.state import Failure
+from solver.loading_history.sweep import STEPS_OF_REFERENCE
 from solver.model import FloatArray, IntArray
 from solver.newton.run import Run, guarded
 from solver.outcome import Outcome
 from solver.packing import Packed, in_rows, pack, packable, unpack
 from solver.settings import Resolution, WearTarget
 
-RTOL_RATIO = 2.0
-"""Ratio of the step tolerances of reference solution and adaptive history. With 4 steps are too long for pairs that
-stick again (dovetail, 16 pairs, 13 harmonics, 212.75 Hz: 1.208 mm3 for 1.540, an error of 32 % where 0.4 % is true)."""
+RTOL_RATIO = float(STEPS_OF_REFERENCE)
+"""Ratio of the step tolerances of reference solution and adaptive history, as of the steps of both sweeps. With 4 steps
+are too long for pairs that stick again (dovetail, 16 pairs, 13 harmonics, 212.75 Hz: 1.208 mm3 for 1.540, an error of
+32 % where 0.4 % is true)."""
 
 MOST_NODES = 800
-"""Most stored steps of a history beside those with an output; half as many after those with the least progress are
-dropped. An adaptive history of 1e5 cycles has about 100 steps."""
+"""Most frequencies of a passage, and most stored steps of a history beside those with an output; half as many after
+those with the least progress are dropped. An adaptive history of 1e5 cycles has about 100 steps."""
 
 CERTIFIED = tuple(each.name for each in fields(Certificate) if each.name != "periodicity_error")
 """Values of a certificate; within a step, the larger value of both ends holds."""

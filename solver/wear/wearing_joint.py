@@ -28,12 +28,9 @@ from solver.outcome import Outcome, in_digits, in_whole
 from solver.packing import packable
 from solver.results.history import PeriodicState, StartState
 from solver.results.state_report import evaluated
-from solver.settings import FollowedFrequency, Scheme, ToTheEnd, WearTarget
+from solver.settings import ROUND_OFF, FollowedFrequency, Scheme, ToTheEnd, WearTarget
 from solver.structure.joint import Case, Joint
 from solver.wear.slow_time import Guide
-
-NO_WEAR = 1e-12
-"""Fraction of `Record.most_rate`: a joint that wears less sticks, and its rate is round-off."""
 
 
 @dataclass(frozen=True)
@@ -243,7 +240,7 @@ class WearingJoint:
 
     def wears(self, state: WearState) -> bool:
         """Whether the wear rate of a state is above the round-off of the slip by the static load."""
-        return self.volume_rate(state) > NO_WEAR * state.record.most_rate
+        return self.volume_rate(state) > ROUND_OFF * state.record.most_rate
 
     def solve(
         self, balance: Balance, start: FloatArray, state: WearState, most: int = NEAR_ITERATIONS

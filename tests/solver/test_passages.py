@@ -101,7 +101,7 @@ def test_wear_that_is_round_off_or_without_any_limit_asks_for_few_frequencies(mo
     noise = np.random.default_rng(0)
     assert len(swept_with(monkeypatch, lambda _: 1e-14 * noise.uniform(), 1e-6).states) == passages.FIRST_FREQUENCIES
     swept = swept_with(monkeypatch, lambda at: 1e-12 / max(abs(at - 1.3), 1e-12), 0.0)
-    assert len(swept.states) < 150 < passages.MOST_FREQUENCIES
+    assert len(swept.states) < 150 < passages.MOST_NODES
     assert swept.error > SETTINGS.rtol * float(passages.parts_of(swept.states).sum()) * 1e-4
 
 

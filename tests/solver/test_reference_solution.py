@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from solver.accuracy.refinement import DIFFERENCE_SAFETY
 from solver.accuracy.resolved_state import UNKNOWN
 from solver.harmonic_balance.state import Failure
 from solver.model import with_friction
@@ -15,7 +16,6 @@ from solver.packing import Packed
 from solver.settings import SolverSettings
 from solver.wear import problem
 from solver.wear.errors import (
-    HISTORY_SAFETY,
     PAIR_OVER_VOLUME,
     Compared,
     HistoryError,
@@ -86,7 +86,7 @@ def test_the_error_of_the_slider_holds_the_exact_answer(scheme, step):
     apart = np.abs(history.worn_volume - history.reference_volume)[1:]
     assert (apart > 0.0).all()
     # given steps differ from the adaptive ones, whose error is added
-    least = (HISTORY_SAFETY if scheme == "adaptive" else 1.0) * apart / history.worn_volume[1:]
+    least = (DIFFERENCE_SAFETY if scheme == "adaptive" else 1.0) * apart / history.worn_volume[1:]
     assert (history.worn_volume_error[1:] >= least * (1.0 - 1e-12)).all()
     assert history.error_estimate < 0.3
 
@@ -196,7 +196,7 @@ def error_of(fine, reference, steps=None, area=AREA):
 def test_an_error_adds_up_what_differs_at_each_pair():
     # volumes agree by chance: what the first pair wears less the second one wears more
     other = [[0.0, 0.0], [1.2, 0.9], [2.4, 1.8]]
-    found, safety = error_of(read(DEPTH), read(other)), HISTORY_SAFETY
+    found, safety = error_of(read(DEPTH), read(other)), DIFFERENCE_SAFETY
     assert found.worn_volume == pytest.approx([0.0, safety * 0.4 / 3.0, safety * 0.8 / 6.0])
     # of pairs of volumes 1 and 2 none is known better than the volume times the root of 9 / 5
     apart = safety * np.abs(np.subtract(DEPTH, other))
@@ -229,7 +229,7 @@ def test_an_error_is_at_least_that_of_the_steps_and_of_the_crossing():
     assert found.wear_depth == pytest.approx(LESS_KNOWN * 0.1 * np.array(DEPTH))
     # between the outputs, at a step, all values of the reference solution differ; at the outputs they agree
     steps = Compared(np.array([1.5]), at_step(2.0), at_step(2.5) | {"wear_depth": np.array([[2.5, 2.0]])})
-    crossing, safety = error_of(fine, read(DEPTH), steps), HISTORY_SAFETY
+    crossing, safety = error_of(fine, read(DEPTH), steps), DIFFERENCE_SAFETY
     assert crossing.worn_volume == pytest.approx([0.0, 0.1, safety * 0.5 / 6.0])
     assert crossing.wear_depth[2] == pytest.approx([safety * 0.5, LESS_KNOWN * safety * 0.5 / 6.0 * 2.0])
     assert crossing.response == pytest.approx([1e-3, 1e-3, safety * 0.25])

@@ -63,7 +63,7 @@ def test_adaptive_steps_are_as_exact_as_asked_for_and_no_shorter():
     at, depth, _ = read(states)
     lengths = np.diff(at)
     worn = np.maximum(np.diff(depth), depth[1:] * lengths / at[1:]) * AREA
-    assert ([state.steps.error for state in states[1:]] <= control.STEP_ERROR_FRACTION * rtol * worn).all()
+    assert ([state.steps.error for state in states[1:]] <= control.SMALL_SHARE * rtol * worn).all()
     assert (lengths[1:] <= LARGEST_STEP_RATIO * lengths[:-1] * (1.0 + 1e-12)).all()
     assert states_of(None, 12, 1e-4)[-1].cycle < 0.5 * at[-1]
 
@@ -89,7 +89,7 @@ def test_a_step_that_is_not_found_is_shortened_and_in_the_end_an_euler_step(monk
     assert states[1].cycle == tried[-1][1]
     failing(monkeypatch, lambda tried: tried[-1][0] == "adaptive")
     length, depth, rate = read(states_of(None, 1))[:, 1]
-    assert length == pytest.approx(control.SHORTEST_SLOW_STEP * first, rel=2e-3)
+    assert length == pytest.approx(control.FINE_STEP * first, rel=2e-3)
     assert depth == pytest.approx(length * rate, rel=1e-6)
 
 
@@ -99,7 +99,7 @@ def test_a_longer_step_goes_across_corners_at_which_every_short_one_ends(monkeyp
     # so short a step changes less than the tolerance
     of.run = of.run.with_tolerance(1e-10)
     first = of.with_first_length(of.unworn_state())
-    shortest = control.SHORTEST_SLOW_STEP * first.steps.length
+    shortest = control.FINE_STEP * first.steps.length
 
     def fails(tried):
         """All steps up to the shortest one, the Euler step, and some longer ones behind it."""
