@@ -160,6 +160,7 @@ def run_block(given: BlockInput) -> BlockResult | Failure:
             resolution=state.point.resolution,
             response_error=checked.estimate.response,
             wear_rate_error=checked.estimate.wear_rate,
+            by_resolution=checked.estimate,
             reference=None,
         ),
         sweep=sweep,

@@ -37,7 +37,7 @@ from solver.model import ComplexArray, FloatArray
 from solver.modes.modal_model import linear_mode
 from solver.newton.run import OutOfTimeError
 from solver.outcome import Outcome, absolute
-from solver.results.history import StartState
+from solver.results.history import StartState, first_cut_off
 from solver.settings import NEGLIGIBLE, ROUND_OFF, SHARE_OF_CAUSE
 from solver.wear.slow_time import MOST_NODES, RTOL_RATIO, Guide
 from solver.wear.step import rate_slope
@@ -110,12 +110,22 @@ def run_passage(given: BlockInput) -> BlockResult | Failure:
         response_error=max(state.start.response_error for state in ends),
         growth_error=error / volume if volume > 0.0 else 0.0,
         inaccurate=math.inf if any(start.unjudged for start in starts) else max(bad, default=0.0),
+        cut_off=_is_cut_off(given, ascending),
         guide=Guide(tuple((state.frequency, state.start.resolution) for state in ascending), math.nan),
         last=ends[-1].start,
         sweep=EarlierSweep(swept.needed),
         iterations=swept.iterations,
         sweep_rate=sweep_rate if volume > 0.0 else 0.0,
     )
+
+
+def _is_cut_off(given: BlockInput, states: Sequence[SweptState]) -> bool:
+    """Whether a pair at an edge of the modelled contact carries load, or wears, at a frequency."""
+    contact, frequencies = given.block.model.contact, np.array([state.frequency for state in states])
+    vibrating = [state.start.state for state in states if state.start.state is not None]
+    pressure = np.array([each.contact_force_h[:, 0, 0] for each in vibrating]) / contact.area
+    density = np.array([state.density for state in states])
+    return not math.isnan(first_cut_off(contact, frequencies, pressure, density))
 
 
 def _slope_of(given: BlockInput, state: SweptState) -> FloatArray:

@@ -172,6 +172,9 @@ class WearProblem(WearingJoint):
         if isinstance(taken, Failure):
             return taken
         end, follow = replace(taken[0], steps=replace(taken[0].steps, length=taken[1])), self.follow
+        if end.cycle >= self.limit * (1.0 - 1e-12):
+            # the sum may be less by its last digit, and a history is not read beyond its last step
+            end = replace(end, cycle=self.limit)
         if follow is not None and not follow.low <= end.point.omega / (2.0 * math.pi) <= follow.high:
             return self.lost(end)
         refused = too_long(self, state, end.depth, end.cycle - state.cycle) if steps is not None else None

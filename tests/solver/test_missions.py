@@ -10,7 +10,7 @@ from scipy.linalg import expm
 
 from solver import Block, Outcome, Passage, SolverSettings, integrate_mission, march_wear
 from solver.accuracy.refinement import refine
-from solver.accuracy.resolved_state import UNKNOWN
+from solver.accuracy.resolved_state import UNKNOWN, Estimate
 from solver.contact.wear_law import WearLaw, WearTable
 from solver.harmonic_balance.state import Failure
 from solver.missions import history as integrating
@@ -105,6 +105,13 @@ def test_the_error_holds_the_steps_within_a_block(blocks, missions, settings, ex
     assert apart < history.error_estimate < max(10.0 * apart, 0.6 * settings.rtol)
     assert (np.abs(history.block_volume[-1] / exact - 1.0) < history.block_volume_error[-1]).all()
     assert history.outcome is Outcome.CONVERGED
+
+
+def test_a_block_that_continues_begins_with_the_errors_of_the_last_state():
+    (first, _) = blocks = as_computed(*two_blocks())
+    result = run_block(BlockInput(MissionRequest(blocks, WEAR, (0, 2), SolverSettings()), first, np.zeros(1)))
+    last = result.last
+    assert last.by_resolution == Estimate(last.response_error, last.wear_rate_error, last.by_resolution.weight)
 
 
 def begun_again(block, depth):

@@ -96,6 +96,15 @@ def swept_with(monkeypatch, density, depth, near=()):
     return swept
 
 
+def test_a_passage_says_that_the_modelled_contact_is_cut_off():
+    model = with_friction(scene("sdof_slider"), 0.5)
+    for edge in (False, True):
+        cut = replace(model, contact=replace(model.contact, edge=np.array([edge])))
+        block = Block(cut, Passage(150.0, 165.0, 7.0), 10.0, None)
+        found = passages.run_passage(BlockInput(MissionRequest((block,), WEAR, (0, 1), SETTINGS), block, np.zeros(1)))
+        assert found.cut_off is edge
+
+
 def test_wear_that_is_round_off_or_without_any_limit_asks_for_few_frequencies(monkeypatch):
     """The integral over the steady states of a resonance without any limit is infinite; the error says so."""
     noise = np.random.default_rng(0)

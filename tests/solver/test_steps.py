@@ -126,6 +126,14 @@ def test_a_given_step_that_is_not_found_is_shortened_and_later_ones_end_at_multi
     assert read(states)[0][[3, 5, 6]].tolist() == [4000.0, 8000.0, 12_000.0]
 
 
+def test_a_step_to_the_last_count_ends_there_to_the_last_digit():
+    of = problem(Given(1e9))
+    state, ends = replace(of.unworn_state(), cycle=500.1), np.linspace(2000.0, 2100.0, 999)
+    # the sum of the count and of what is left is less
+    of.limit = float(next(end for end in ends if state.cycle + (end - state.cycle) < end))
+    assert of.step(state).cycle == of.limit
+
+
 def test_a_state_with_other_harmonics_has_the_wear_rate_of_its_own_motion():
     work = problem()
     work.case = replace(work.case, settings=SolverSettings("auto", 512, rtol=1e-4))
