@@ -6,13 +6,14 @@ into those of the pairs (r) and all others (i),
     Z_r = A_rr - A_ri A_ii^-1 A_ir,      F_r = f_r - A_ri A_ii^-1 f_i.                                         (8)
 """
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import Any, NamedTuple, cast
 
 import numpy as np
+from scipy.linalg.lapack import zgetrf, zgetrs
 
 from solver.model import ComplexArray, FloatArray, IntArray, LinearModel, Matrix, ReducedModel
 from solver.structure.fourier import from_complex, to_complex
@@ -265,6 +266,16 @@ class FrequencySlope:
     response: ComplexArray
 
 
+def _factorised(matrix: ComplexArray) -> Callable[[ComplexArray], ComplexArray]:
+    """Solutions (n,) of systems with one matrix (n, n), which may be empty."""
+    if not matrix.size:
+        return lambda right: right
+    factor, pivots, singular = zgetrf(matrix)
+    if singular:
+        raise np.linalg.LinAlgError
+    return lambda right: cast("ComplexArray", zgetrs(factor, pivots, right)[0])
+
+
 def frequency_slope(
     model: ReducedModel, omega: float, excitation_amplitude: float, orders: tuple[int, ...], displacement_h: FloatArray
 ) -> FrequencySlope:
@@ -277,17 +288,22 @@ def frequency_slope(
     A difference of two condensations is not accurate: behind a joint that sticks A_ii is nearly singular close to the
     resonance that is followed.
     """
-    relative = model.contact.relative
-    moving, still = to_complex(displacement_h), np.zeros(relative.size, complex)
+    relative, moving = model.contact.relative, to_complex(displacement_h)
+    others = np.setdiff1d(np.arange(len(model.linear[0].mass)), relative)
     force, product = np.zeros((relative.size, len(orders)), complex), 0.0 + 0.0j
     response = np.zeros(model.linear[0].response.shape[0], complex)
     for place, n in enumerate(orders):
         linear, rate = model.harmonic_structure(n), 1j * n * omega
         load = (excitation_amplitude if n == 1 else 0.0) * linear.load_harmonic
-        x = whole_motion(linear, rate, relative, load, moving[:, place])
+        full = _dynamic_stiffness(linear, rate, ...)
+        x, turned = np.zeros((2, len(full)), complex)
+        x[relative] = moving[:, place]
+        with regular(f"at {n * omega / (2.0 * np.pi):.6g} Hz"):
+            solve = _factorised(full[np.ix_(others, others)])
+        x[others] = solve(load[others] - full[np.ix_(others, relative)] @ moving[:, place])
         slope = 1j * n * (linear.damping @ x) - 2.0 * n**2 * omega * (linear.mass @ x)
-        turned = whole_motion(linear, rate, relative, -slope, still)
-        force[:, place] = slope[relative] + _dynamic_stiffness(linear, rate, relative) @ turned
+        turned[others] = solve(-slope[others])
+        force[:, place] = slope[relative] + full[np.ix_(relative, others)] @ turned[others]
         if n == 1:
             product, response = complex(load.conj() @ turned), linear.response @ turned
     return FrequencySlope(from_complex(np.zeros(relative.size), force), product, response)
