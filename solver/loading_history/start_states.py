@@ -221,7 +221,7 @@ class FrequencySweep:
         reference = present.reference_of(found.point, self.run)
         if reference is not None:
             estimate = estimate + found.difference(ResolvedState(found.case, reference))
-        elif present.here is not None and present.reference:
+        elif present.here is not None and (present.reference or present.begins_before(found.point)):
             estimate, found = UNKNOWN, replace(found, accurate=False)
         known = estimate.response, estimate.wear_rate
         # folds of a ramp are load factors
