@@ -31,9 +31,9 @@ from solver.structure.joint import Joint
 class Balance:
     """A periodic problem: a joint, the tangential history of its pairs, and the wear.
 
-    - history (n_contact, 2): tangential history, m (`Element`). first (n_contact, 3, N): predicted force, N, with
-      this history, from which that of the state has slowly come; None where it was always the same.
-    - wear_depth (n_contact,): depth at the start of the slow step, m; constant through the period, Eq. (6). Default: 0.
+    - history (n_contact, n_history): tangential history, m (`Element`). first (n_contact, 3, N): predicted force, N,
+      with this history, from which that of the state has slowly come; None where it was always the same.
+    - wear_depth (n_contact,): depth without the growth, m; constant through the period, Eq. (6). Default: 0.
     - wear_gain (n_contact,): growth of the depth per wearing work, m/J; 0 where W is given. wearing: this work.
     """
 
@@ -90,7 +90,7 @@ class Evaluation(Marched):
     """Residual for a predicted force, with the contact forces and states of the pairs.
 
     - predicted_h, residual (n_rel, 2H+1): N. scale: of the residual in the static and in the other harmonics, N.
-    - history (n_contact, 2): with which the period begins, m. displacement_h (n_contact, 3, 2H+1): motion, m.
+    - history (n_contact, n_history): with which the period begins, m. displacement_h (n_contact, 3, 2H+1): motion, m.
     - wear_depth (n_contact,): m; at the end of the step in an implicit step.
     """
 

@@ -23,7 +23,7 @@ from solver.structure.joint import Case, Hold, Joint
 class State:
     """A converged periodic state; the next one depends on it alone.
 
-    history (n_contact, 2): tangential history for the next state, m. parameter: of the path; NaN where there is none.
+    history (n_contact, n_history): tangential history for the next state, m. parameter: of the path; NaN if none.
     omega, excitation_amplitude, resolution, hold: of its joint: rad/s, N, harmonics and samples, as in `Case`.
     """
 

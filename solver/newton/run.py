@@ -32,10 +32,9 @@ FULL_STEPS = 6
 up to 20 % more iterations with impacts."""
 
 SHORTEST_STEP = 1.0 / 128.0
-"""Shortest step as a fraction of the full step: seven halvings. With six one of 60 random scenes gets no accurate
+"""Shortest step as a fraction of the full step: six halvings. With five one of 60 random scenes gets no accurate
 state. Also the shortest natural step over the range to the target, the shortest Euler step on the slow time over the
-wanted one, and the shortest relaxation step in periods; and the length to which a
-fold is located over that of the step with it."""
+wanted one, the shortest relaxation step in periods, and the length to which a fold is located over its step."""
 
 SAMPLES_OF_SIGN = 16
 """Samples over those of a state that is unstable with fewer: the sign of the determinant may turn where many pairs slip
@@ -79,7 +78,7 @@ def solve_newton(
     most: int = MOST_ITERATIONS,
 ) -> tuple[EvaluationT | None, int]:
     """Iterate `x <- x + t direction(x)` from `start` until the scaled residual is at most the tolerance. Returns the
-    evaluation of the solution, None where none is found, and the number of iterations.
+    evaluation of the solution, None where none is found, and the number of iterations, of a lost search the most.
 
     The residual is piecewise smooth. A full step that raises it often ends in the piece with the solution. So full
     steps come first, as long as the lowest norm is improved once in `FULL_STEPS` iterations. Then the iteration returns

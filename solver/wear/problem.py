@@ -62,7 +62,8 @@ class WearProblem(WearingJoint):
         takes a step that is `too_long`: its difference is the warning, and in a last long step nearly all of the force
         of a joint at rest is moved.
     stable_end: whether the stability of the last state is tested.
-    limit: cycle count beyond which no step goes; inf for adaptive steps, unless the request `ends_at_last`.
+    limit: cycle count beyond which no step goes; inf for adaptive steps, unless the request `ends_at_last`, and for
+        given steps to the end of wear.
     """
 
     # 1 s of 48 pairs, 17 s of 336; the cost of one more factorisation is negligible

@@ -261,3 +261,19 @@ def test_states_whose_slip_was_ratcheting_are_found_and_slip_by_their_vibration_
     assert not ratchets(state.joint(case), at, 1e-3)
     # shaken down with 3 harmonics scene 710 slips 1e-12 N m on to where 9 have it, a thousand times what is left there
     assert (at.slip_work.sum() > 1e-13) == slips
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("frequency", [212.35, 212.355])
+def test_the_error_is_told_where_slip_begins_behind_the_last_node(frequency):
+    """The last node has no slip, and three harmonics for the 27 and 39 of the state."""
+    model, omega = scene("dovetail_sector", 39, mesh=1), 2.0 * np.pi * frequency
+
+    def slip_work(settings):
+        (start,) = branch_states(model, 0.5, 0.5, [omega], settings)
+        case = case_of(model, 0.5, start.penalty_omega, settings, start.resolution)
+        return evaluated(case, start.state).evaluation.slip_work.sum(), start.wear_rate_error
+
+    work, told = slip_work(SolverSettings())
+    true = slip_work(SolverSettings(39, 512, rtol=1e-3))[0] / work - 1.0
+    assert 0.04 < true < told < 4.0 * true
