@@ -59,7 +59,7 @@ are equal, the sweep of the dovetail of 16 pairs within 2e-5."""
 
 NODE_UNKNOWNS = MOST_UNKNOWNS // 2
 """Most unknowns of a node of a sweep, those of the dovetail of 48 pairs with 13 harmonics; it takes them where nine are
-wrong by more than rtol. With nine at most, errors of 2.4 and 44 % are told at 211.375 and 212.5 Hz, where it is 0.6 and
+wrong by more than rtol. With nine at most, errors of 2.4 and 44 % are told at 211.375 and 212.5 Hz, where it is 0.4 and
 1.2 %. Also of a small joint: impacts couple all harmonics, and no preconditioner helps."""
 
 HIGHEST_ABOVE = {True: 13, False: 19}
