@@ -219,10 +219,10 @@ class FrequencySweep:
         if unstable is not None and not unstable.outcome.complete:
             return unstable
         reference = present.reference_of(found.point, self.run)
-        if reference is not None:
+        if isinstance(reference, Failure):
+            estimate, found, reference = UNKNOWN, replace(found, accurate=False), None
+        elif reference is not None:
             estimate = estimate + found.difference(ResolvedState(found.case, reference))
-        elif present.here is not None and (present.reference or present.begins_before(found.point)):
-            estimate, found = UNKNOWN, replace(found, accurate=False)
         known = estimate.response, estimate.wear_rate
         # folds of a ramp are load factors
         fold = (present.fold, *folds)[-1] / (2.0 * np.pi) if self.omega is None else math.nan

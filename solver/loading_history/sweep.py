@@ -58,9 +58,9 @@ STEPS_OF_REFERENCE = 2
 """Steps of a sweep in one step of its reference: the errors of both are of second order in the step, and their
 difference is three times the smaller one."""
 
-PARTS_TO_POINT = (1, 4, 16)
-"""Parts of the way from the last node of a reference sweep to a point: more where the point is not found at once.
-Without 4 parts the error of a mode of a ring is told twice as large."""
+HALVINGS_TO_SLIP = 3
+"""Halvings of the step in which slip begins, to find where its reference begins. Dovetail, 16 pairs, 39 harmonics,
+212.341 to 212.355 Hz, where rates are 220 to 4 % off: told are 64 to 1.4 % with two, 117 to 1.8 % with three and four."""
 
 LARGEST_CHANGE = 2.0
 """Largest change between two nodes of an earlier sweep, over the largest change of a step of a sweep."""
@@ -79,7 +79,8 @@ class Sweep(Generic[S]):
     length: of the next step. rate: change in the last one, over the largest change allowed, per length.
     checked, error: the node at which the harmonics were chosen, and its largest estimated error.
     branch, fold: number of folds jumped over so far, and the parameter at the last of them, NaN if none.
-    reference: last nodes of the reference sweep; skipped: parameters of the nodes since then.
+    reference: last nodes of the reference sweep, none before it begins; None where it is lost, until no history lasts.
+    skipped: parameters of the nodes since then.
     """
 
     path: Path[S]
@@ -95,7 +96,7 @@ class Sweep(Generic[S]):
     error: float = 0.0
     branch: int = 0
     fold: float = math.nan
-    reference: tuple[S, ...] = ()
+    reference: tuple[S, ...] | None = ()
     skipped: tuple[float, ...] = ()
     saved: dict[str, Any] = field(default_factory=dict)
 
@@ -122,33 +123,23 @@ class Sweep(Generic[S]):
         """The current node, None where there is no state."""
         return self.last if self.failure is None else None
 
-    def reference_of(self, state: S, run: Run) -> S | None:
-        """State to which the last reference node leads, with parameter and harmonics of a state; None if not found.
+    def reference_of(self, state: S, run: Run) -> S | Failure | None:
+        """State to which the reference sweep leads, with parameter and harmonics of a state, or why its error is not
+        known. None where no history lasts to the state.
 
-        Where slip begins between the last node and the state, the node before the last one leads to it, for nodes
-        without slip may have few harmonics (dovetail, 16 pairs, 212.35 Hz: 3 for 39, and the wear rate is 4 % off).
+        Where slip begins between the last node and the state, the reference begins there, and with the harmonics of the
+        state: nodes without slip may have fewer (dovetail, 16 pairs, 212.35 Hz: 3 for 39, and the wear rate is 4 % off).
         """
-        if self.here is None or not (self.reference or self.begins_before(state)):
+        here, states, path = self.here, self.reference, self.path
+        if here is None:
             return None
-        last, path = self.reference[-1] if self.reference else self.nodes[-2:][0], self.path.at(state.resolution)
-        node = path.moved(last, run)
-        if node is None:
-            # there may be no state with these harmonics at the node, as there is one at the point
-            there = self.path.at(last.resolution).solve((last,), state.parameter, run.fresh())
-            return None if there is None else path.moved(there, run)
-        # over states in between where the last part is too long
-        for n_parts in PARTS_TO_POINT:
-            way = np.linspace(node.parameter, state.parameter, n_parts + 1)[1:].tolist()
-            if found := follow(path, (node,), way, run.fresh()):
-                return found[-1]
-        return None
-
-    def begins_before(self, state: S) -> bool:
-        """Whether a history that lasts to a state begins behind the last node, and no reference sweep has begun."""
-        here, path = self.here, self.path
-        if here is None or self.reference or path.rests(state) or path.forgets(state):
-            return False
-        return path.rests(here) or path.forgets(here)
+        if states == ():
+            lasts = not (path.rests(state) or path.forgets(state)) and (path.rests(here) or path.forgets(here))
+            if not lasts:
+                return None
+            states = (self._before_slip(here, state, run),)
+        found = None if states is None else _led(path.at(state.resolution), states, (state.parameter,), run)
+        return found[-1] if found else Failure(Outcome.BRANCH_LOST, "the reference sweep is lost")
 
     def begin(self, state: S) -> bool:
         """Take the first state, and go on with its harmonics and samples; False where it is rejected.
@@ -235,25 +226,32 @@ class Sweep(Generic[S]):
         if step.folds or self.path.forgets(step.state):
             self.reference, self.skipped = (), ()
             return
-        if not self.reference:
+        if self.reference == ():
             if self.path.rests(step.state):
                 return
-            self.reference = (before,)
+            self.reference = (self._before_slip(before, step.state, self.run),)
         self.skipped = (*self.skipped, step.state.parameter)
-        if len(self.skipped) == STEPS_OF_REFERENCE:
+        if self.reference is not None and len(self.skipped) == STEPS_OF_REFERENCE:
             path = self.path.at(fewer(self.path.case.resolution, self.path.case.settings))
+            if self.reference[-1].resolution != path.case.resolution:
+                self._reference_run = self.run.fresh()
+            rough = self._reference_run.with_tolerance(path.case.settings.rough_tolerance)
             middle = 0.5 * (before.parameter + step.state.parameter)
-            self.reference = self._led(path, middle) or self._led(path, *self.skipped[:-1], middle)
+            found = _led(path, self.reference, (middle,), rough)
+            self.reference = found or _led(path, self.reference, (*self.skipped[:-1], middle), rough) or None
             self.skipped = ()
 
-    def _led(self, path: Path[S], *targets: float) -> tuple[S, ...]:
-        """The reference sweep along a path with fewer harmonics, at the last of some targets; none if none is found."""
-        states = self.reference
-        if states[-1].resolution != path.case.resolution:
-            self._reference_run = self.run.fresh()
-            moved = path.moved(states[-1], self.run)
-            states = () if moved is None else (moved,)
-        return follow(path, states, targets, self._reference_run.with_tolerance(path.case.settings.rough_tolerance))
+    def _before_slip(self, before: S, after: S, run: Run) -> S:
+        """Last state without slip that is found on the way from a node to a state where pairs slip; else the node.
+
+        The sweep itself goes from node to state on one straight line, as a reference that begins at the node would.
+        """
+        step, run = after.parameter - before.parameter, run.fresh()
+        for _ in range(HALVINGS_TO_SLIP if self.path.rests(before) else 0):
+            step *= 0.5
+            state = self.path.solve((before,), before.parameter + step, run)
+            before = state if state is not None and self.path.rests(state) else before
+        return before
 
     def _choose_resolution(self) -> float:
         """Choose automatic harmonics and samples of the nodes; returns the estimated relative error of the response."""
@@ -272,6 +270,18 @@ class Sweep(Generic[S]):
         """Save the current node, and go on as a sweep that is resumed there."""
         self.load(in_rows({name: vars(self)[name] for name in _SAVED} | {"iterations": self.budget.iterations}))
         self.save()
+
+
+def _led(path: Path[S], states: tuple[S, ...], targets: Sequence[float], run: Run) -> tuple[S, ...]:
+    """As `follow`, from states that may have other harmonics and samples than the path."""
+    if (resolution := states[-1].resolution) == path.case.resolution:
+        return follow(path, states, targets, run, halvings=ATTEMPTS)
+    if (moved := path.moved(states[-1], run)) is not None:
+        return follow(path, (moved,), targets, run, halvings=ATTEMPTS)
+    # there may be no state with these harmonics at the node, as there is one farther on
+    found = follow(path.at(resolution), states, targets, run.fresh(), halvings=ATTEMPTS)
+    moved = path.moved(found[-1], run) if found else None
+    return () if moved is None else (moved,)
 
 
 def follow(

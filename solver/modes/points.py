@@ -180,7 +180,10 @@ def _judged(mode: NonlinearMode, found: ModeState, sweep: Sweep[ModeState] | Non
     if certificate.failures(settings.tolerance):
         return Failure(Outcome.CERTIFICATE_FAILED, certificate.sentence(settings.tolerance))
     errors = _errors_by_resolution(mode, found, run)
-    if sweep is not None and (reference := sweep.reference_of(found, run)) is not None:
+    reference = None if sweep is None else sweep.reference_of(found, run)
+    if isinstance(reference, Failure):
+        errors = np.full(3, math.inf)
+    elif reference is not None:
         errors = errors + np.abs(reference.values - found.values)
     # the damping ratio is the sum of parts that may cancel: its error is judged against the part of friction
     by_friction = float(joint.law.friction_work(at).sum()) / (2.0 * np.pi * (found.omega * found.parameter) ** 2)
