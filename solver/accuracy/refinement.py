@@ -132,7 +132,7 @@ class _Search:
     node: bool
 
     def refined(self, here: ResolvedState) -> ResolvedState:
-        settings, faint = here.case.settings, False
+        settings, faint, best = here.case.settings, False, replace(here, estimate=UNKNOWN, accurate=False)
         while True:
             if nothing_happens(here.point.evaluation):
                 here, faint = self._linear(here)
@@ -156,10 +156,13 @@ class _Search:
             if settings.samples == "auto" and by_samples.largest > SHARE_OF_CAUSE * settings.rtol:
                 samples = 2 * here.case.resolution.samples
             following = self._next(here, Resolution(orders, samples))
+            if holds and estimate.largest <= best.estimate.largest:
+                best = replace(here, estimate=estimate)
             if following is None:
+                best = best if math.isfinite(best.estimate.largest) else replace(here, estimate=estimate)
                 # slip that only many samples show is no reason to reject an accurate motion
-                judged = estimate.response if faint else estimate.largest
-                return replace(here, estimate=estimate, accurate=judged <= settings.rtol)
+                judged = best.estimate.response if faint else best.estimate.largest
+                return replace(best, accurate=judged <= settings.rtol)
             here = following
 
     def _linear(self, here: ResolvedState) -> tuple[ResolvedState, bool]:

@@ -16,8 +16,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Generic
 
-import numpy as np
-
 from solver.accuracy.refinement import VIBRATION_RECHECK
 from solver.accuracy.resolved_state import NOTHING, fewer
 from solver.continuation.first_state import solve_first_state
@@ -60,7 +58,8 @@ difference is three times the smaller one."""
 
 HALVINGS_TO_SLIP = 3
 """Halvings of the step in which slip begins, to find where its reference begins. Dovetail, 16 pairs, 39 harmonics,
-212.341 to 212.355 Hz, where rates are 220 to 4 % off: told are 64 to 1.4 % with two, 117 to 1.8 % with three and four."""
+212.341 to 212.355 Hz, where rates are 220 to 4 % off: with two, 64 to 1.4 % are told, with three and four 117 to
+1.8 %."""
 
 LARGEST_CHANGE = 2.0
 """Largest change between two nodes of an earlier sweep, over the largest change of a step of a sweep."""
@@ -128,7 +127,8 @@ class Sweep(Generic[S]):
         known. None where no history lasts to the state.
 
         Where slip begins between the last node and the state, the reference begins there, and with the harmonics of the
-        state: nodes without slip may have fewer (dovetail, 16 pairs, 212.35 Hz: 3 for 39, and the wear rate is 4 % off).
+        state, of which nodes without slip may have fewer (dovetail, 16 pairs, 212.35 Hz: 3 for 39, and the wear rate is
+        4 % off).
         """
         here, states, path = self.here, self.reference, self.path
         if here is None:

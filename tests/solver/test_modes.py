@@ -8,6 +8,7 @@ import pytest
 import scipy.linalg
 
 from solver import Outcome, SolverSettings, backbone, build_model, frequency_response, modal_response
+from solver.loading_history import sweep as sweep_module
 from solver.model import with_friction
 from solver.modes.points import follow_mode
 from solver.structure.condensation import whole_motion
@@ -131,6 +132,13 @@ def test_the_reference_of_a_mode_does_not_go_backwards():
     found = backbone(foot(), [3e-3], 0.5)
     assert found.outcome == (Outcome.CONVERGED,)
     assert found.frequency_error[0] < 1e-3 * found.frequency[0]
+
+
+def test_a_mode_whose_reference_is_lost_has_an_unknown_error(monkeypatch):
+    monkeypatch.setattr(sweep_module, "follow", lambda *_, **__: ())
+    found = backbone(foot(), FOOT_AMPLITUDES[:2], 0.5, settings=FIXED)
+    assert found.outcome[1] is Outcome.INACCURATE
+    assert np.isinf([found.frequency_error[1], found.damping_error[1]]).all()
 
 
 @pytest.mark.slow
