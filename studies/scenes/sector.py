@@ -7,9 +7,6 @@ from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from solver.model import FloatArray, IntArray, ReducedModel
 from studies.finite_element.cut_faces import CutFaces, CyclicAxis
@@ -130,10 +127,9 @@ def mesh_of_bodies(
     n_nodes = n_elements = 0
     for blocks, parts, material in bodies:
         points = np.concatenate([block.reshape(-1, 3) for block in blocks])
-        pairs = cKDTree(points).query_pairs(_SAME_NODE, output_type="ndarray")
-        touching = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(points), len(points)))
-        _, node = connected_components(touching, directed=False)
-        _, first = np.unique(node, return_index=True)
+        places = np.round(points / _SAME_NODE).astype(np.int64)
+        _, first, place = np.unique(places, axis=0, return_index=True, return_inverse=True)
+        node = np.argsort(np.argsort(first))[place.ravel()]  # numbered as they first appear
         ends = np.cumsum([0] + [block[..., 0].size for block in blocks])
         for block, part, (start, end) in zip(blocks, parts, pairwise(ends), strict=True):
             grids.append(n_nodes + node[start:end].reshape(block.shape[:3]).astype(np.int64))
@@ -141,7 +137,7 @@ def mesh_of_bodies(
             numbers = n_elements + np.arange(len(cells)) + 1
             groups.append(ElementGroup("C3D8I", cells, numbers, material, part))
             n_elements += len(cells)
-        nodes.append(points[first])
+        nodes.append(points[np.sort(first)])
         n_nodes += len(first)
     return SolidMesh(np.concatenate(nodes), np.arange(n_nodes) + 1, tuple(groups)), tuple(grids)
 
