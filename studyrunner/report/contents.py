@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any, cast
+from typing import Any
 
 from studyrunner.report import drawing as plot
 from studyrunner.report.drawing import Drawing, Drawn, Item, Missing, Table, as_sentences
@@ -68,13 +68,13 @@ class Entry:
     at: str = ""
     always: bool = False
 
-    def make(self, result: Result) -> Item | None:
-        """The figure, a sentence in its place, or None."""
+    def make(self, result: Result, width: float = plot.WIDTH) -> Item | None:
+        """The figure, a sentence in its place, or None. width: of the figure, inches."""
         axis, how = course_axis(result) or "", CAPTIONS.get(self.name, "")
         title = self.title.format(slow=result.counted, over=axis.replace("_", " ")).removesuffix(" (table)")
         shown = of_shown_scene(result, self.scene) if self.scene else result
         needs = (*self.needs, *(self.of if isinstance(self.of, dict) else ()))
-        drawn = result.lacks(*needs) or self._drawn(shown, plot.WIDTH)
+        drawn = result.lacks(*needs) or self._drawn(shown, width)
         if drawn is None:
             return None
         if isinstance(drawn, str):
@@ -85,8 +85,7 @@ class Entry:
         if isinstance(drawn, Table):
             return replace(drawn, name=self.name, title=title, note=as_sentences(drawn.note, how))
         figure, *notes = drawn
-        caption = as_sentences(*notes, how)
-        return Drawing(self.name, title, caption, figure, lambda: cast("Any", self._drawn(shown, plot.COLUMN_WIDTH))[0])
+        return Drawing(self.name, title, as_sentences(*notes, how), figure)
 
     def _drawn(self, result: Result, width: float) -> Drawn:
         # the style is that of the whole process: the caller does not run with it
@@ -146,13 +145,16 @@ FIGURES = (
 """The figures of all results."""
 
 
-def draw_report(result: Result) -> Iterator[Item]:
-    """Figures, tables, and sentences about what is missing: the results, then how far they are to be trusted."""
+def draw_report(result: Result, width: float = plot.WIDTH) -> Iterator[Item]:
+    """Figures, tables, and sentences about what is missing: the results, then how far they are to be trusted.
+
+    width: of the figures, inches.
+    """
     kind = MODES if result.has_modes else WEAR if result.blocks is None else MISSIONS
     has_results = bool(result.has_values.any())
     for entry in FIGURES:
         if kind in entry.kinds and (has_results or entry.always):
-            item = entry.make(result)
+            item = entry.make(result, width)
             if item is not None:
                 yield item
     if not has_results:
