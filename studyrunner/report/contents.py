@@ -71,14 +71,14 @@ class Entry:
     def make(self, result: Result, width: float = plot.WIDTH) -> Item | None:
         """The figure, a sentence in its place, or None. width: of the figure, inches."""
         axis, how = course_axis(result) or "", CAPTIONS.get(self.name, "")
-        title = self.title.format(slow=result.counted, over=axis.replace("_", " ")).removesuffix(" (table)")
+        title = self.title.format(slow=result.counted, over=axis.replace("_", " "))
         shown = of_shown_scene(result, self.scene) if self.scene else result
         needs = (*self.needs, *(self.of if isinstance(self.of, dict) else ()))
         drawn = result.lacks(*needs) or self._drawn(shown, width)
         if drawn is None:
             return None
         if isinstance(drawn, str):
-            return Missing(self.name, title, drawn)
+            return Missing(self.name, title, as_sentences(drawn))
         named = {"point": ("frequency", "scheme", *shown.varying, *shown.fixed), "course": (axis or "frequency",)}
         where = shown.describe(shown.shown, named.get(self.at, ()))
         title = f"{title}: {where}" if where else title
@@ -111,7 +111,7 @@ def _mode(draw: Callable[[Result, Any], Drawn], name: str, title: str, **options
 
 
 FIGURES = (
-    Entry("blocks", "Blocks of the mission with their wear (table)", wear.list_blocks, needs=wear.LISTED, **_BLOCK),
+    Entry("blocks", "Blocks of the mission with their wear", wear.list_blocks, needs=wear.LISTED, **_BLOCK),
     Entry("block_shares", "Wear by block over the missions", wear.draw_blocks, wear.SHARES, **_BLOCK),
     Entry("block_responses", "Vibration of each block over the missions", wear.draw_blocks, wear.RESPONSES, **_BLOCK),
     _mode(response.draw_mode, "natural_frequency", "Natural frequency of a mode over its amplitude"),
@@ -139,7 +139,7 @@ FIGURES = (
     Entry("pair_numbers", "Numbers of the contact pairs", pairs.draw_numbers, scene=OF_PAIRS, kinds=_ALL),
     Entry("natural_frequencies", "Sector and its natural frequencies, joint stuck", root.draw_sector, **_SECTOR),
     Entry("outcome_map", "How the points ended", points.draw_outcomes, always=True, kinds=_ALL),
-    Entry("certificates", "Certificates: how right the states are (table)", points.list_certificates),
+    Entry("certificates", "Certificates: how right the states are", points.list_certificates),
     Entry("precision", "Error against run time", precision.draw_precision, kinds=_OF_WEAR),
 )
 """The figures of all results."""
