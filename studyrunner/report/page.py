@@ -67,6 +67,8 @@ def _save(drawing: Drawing, folder: Path) -> dict[str, Any]:
     text = drawing.save(folder).read_text(encoding="utf-8")
     files = [name for kind in ("svg", "png", "csv") if (folder / (name := f"{drawing.name}.{kind}")).exists()]
     about = {"name": drawing.name, "title": drawing.title, "caption": drawing.caption}
+    # pixels on a wide screen: half as large again as in print
+    about["width"] = f"{1.5 * 96.0 * drawing.figure.get_figwidth():.0f}"
     return {**about, "picture": text[text.index("<svg") :], "files": files}
 
 
