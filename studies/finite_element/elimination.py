@@ -138,6 +138,7 @@ def factorise(matrix: sparse.csr_matrix, dissection: Dissection, rounding: float
         whole = _gathered(ordered, front)
         for child in front.children:
             places = _places(front, dissection.fronts[child].boundary)
+            # transposed, as it is in memory; what is above the diagonal counts for nothing
             whole.T[np.ix_(places, places)] += waiting.pop(child).T
         lower, below, waiting[number] = _eliminate(whole, front.stop - front.first, rounding)
         blocks.append((lower, below))
