@@ -8,10 +8,11 @@ Everything that `solver`, `studies` and `studyrunner` export, loaded at its firs
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+import xarray as xr
+
 import solver
 import studies
 import studyrunner
-import studyrunner.accessor
 
 if TYPE_CHECKING:
     from solver import *  # noqa: F403
@@ -25,6 +26,11 @@ _PLACES = {name: package.__name__ for package in (solver, studies, studyrunner) 
     "worn_volume_statistics": "studyrunner.statistics.study_statistics",
 }
 __all__ = sorted(_PLACES)
+
+# until `studyrunner.accessor`, which takes a while to load, puts its own in place of this
+xr.Dataset.fretwear = property(  # type: ignore[attr-defined]
+    lambda dataset: import_module("studyrunner.accessor").FretwearAccessor(dataset)
+)
 
 
 def __getattr__(name: str) -> object:

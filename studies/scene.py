@@ -1,12 +1,13 @@
 """What a scene is: its parameters, its reduced model, and what it can tell beside the model."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import Annotated, ClassVar, Self
+from typing import Annotated, ClassVar, Self, get_args
 
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field
+from pydantic.fields import FieldInfo
 
 from solver.compliant_contact import LARGEST_CONTACT_STIFFNESS, with_contact_stiffness
 from solver.model import FloatArray, IntArray, ReducedModel
@@ -81,18 +82,58 @@ def lowest(frequencies: FloatArray) -> FloatArray:
     return np.append(own, np.full(N_MODES - len(own), np.nan))
 
 
+@dataclass(frozen=True)
+class Unit:
+    """Metadata of a key: the unit of its values, as a result has it."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Remark:
+    """Metadata of a key: what else a reader has to know, as what is taken where the key is not given."""
+
+    text: str
+
+
+Metre = Annotated[float, Unit("m")]
+SquareMetre = Annotated[float, Unit("m2")]
+Degree = Annotated[float, Unit("degree")]
+Rpm = Annotated[float, Unit("rpm")]
+Kilogram = Annotated[float, Unit("kg")]
+Density = Annotated[float, Unit("kg/m3")]
+Newton = Annotated[float, Unit("N")]
+NewtonPerMetre = Annotated[float, Unit("N/m")]
+Damping = Annotated[float, Unit("N s/m")]
+Pascal = Annotated[float, Unit("Pa")]
 ContactStiffness = Annotated[
     float | None,
-    Field(
-        gt=0,
-        le=LARGEST_CONTACT_STIFFNESS,
-        description="normal stiffness per area of rough surfaces; rigid if not given, N/m3",
-    ),
+    Field(gt=0, le=LARGEST_CONTACT_STIFFNESS, description="normal stiffness per area of rough surfaces"),
+    Unit("N/m3"),
+    Remark("rigid if not given"),
 ]
 
 
+def said_of(field: FieldInfo, kind: type[Unit] | type[Remark]) -> str:
+    """Unit or remark of a key, also of one that takes other kinds of values as well; empty where it has none."""
+
+    def among(part: object) -> Iterator[str]:
+        if isinstance(part, kind):
+            yield part.text
+        for inner in get_args(part):
+            yield from among(inner)
+
+    return next((found for part in (*field.metadata, field.annotation) for found in among(part)), "")
+
+
+def describe_field(field: FieldInfo) -> str:
+    """Meaning of a key, its unit, and what else is said of it."""
+    meaning = ", ".join(filter(None, (field.description, said_of(field, Unit))))
+    return "; ".join(filter(None, (meaning, said_of(field, Remark))))
+
+
 class Scene(BaseModel):
-    """Parameters of a bundled scene, and what follows from them. Units stand in the descriptions.
+    """Parameters of a bundled scene, and what follows from them. Units are metadata of the keys.
 
     FRICTION_IN_MODEL: whether the reduced model depends on the friction coefficient. OFFERS: what a study may ask for
     among `outputs.variables` that not every scene knows: "mesh", "exact" (a method `exact_answer`).
@@ -103,7 +144,7 @@ class Scene(BaseModel):
     FRICTION_IN_MODEL: ClassVar[bool] = False
     OFFERS: ClassVar[tuple[str, ...]] = ()
 
-    friction_coefficient: float = Field(0.5, ge=0, description="Coulomb friction coefficient, 1")
+    friction_coefficient: float = Field(0.5, ge=0, description="Coulomb friction coefficient")
     contact_stiffness: ContactStiffness = None
 
     def build(self, n_harmonics: int, /) -> ReducedModel:
@@ -174,5 +215,5 @@ def list_keys(parameters: type[BaseModel]) -> str:
     for name, field in parameters.model_fields.items():
         shown = f"{field.default:g}" if isinstance(field.default, float) else str(field.default).lower()
         default = "" if field.default is None or field.is_required() else f" = {shown}"
-        lines.append(f"- `{name}{default}`: {str(field.description).removesuffix(', 1').removesuffix(', -')}")
+        lines.append(f"- `{name}{default}`: {describe_field(field)}")
     return "\n".join(lines)

@@ -113,7 +113,7 @@ def _overrides(result: Result) -> dict[str, Any]:
         keys[f"axes.{name}"] = (getattr(part.axes, name, None) or study.dimensions[name])[shown[name]]
     if result.followed:
         if not result.has("excitation_frequency"):
-            remedy = result.lacks("excitation_frequency").removesuffix(".")
+            remedy = result.lacks("excitation_frequency")
             raise UserError(str(result.path), "excitation_frequency", None, remedy)
         keys["axes.frequency"] = float(result.at("excitation_frequency", shown, result.last_reached(shown)))
     return keys | _ALONE
@@ -122,7 +122,7 @@ def _overrides(result: Result) -> dict[str, Any]:
 def _depths(result: Result, shown: Mapping[str, int], last: int, *, only_last: bool = False) -> dict[str, Any]:
     """The table `scene.worn` with the depths at the first count, where they are known, and at the last one."""
     if not has_depths(result):
-        raise UserError(str(result.path), "wear_depth", None, result.lacks("wear_depth").removesuffix("."))
+        raise UserError(str(result.path), "wear_depth", None, result.lacks("wear_depth"))
     depth = depths(result, shown)[:, pairs_of_scene(result, shown)]
     if result.has("worn_depth"):
         depth = depth + result.dataset["worn_depth"].isel(shown, missing_dims="ignore").values

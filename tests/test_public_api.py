@@ -77,13 +77,19 @@ def test_importing_loads_no_more_than_is_needed():
     code = """
 import sys, solver, studies.scenes, studyrunner
 print({'numpy', 'scipy', 'pydantic', 'h5py', 'xarray', 'numba'} & set(sys.modules))
+import studyrunner.plan
+print({'numba'} & set(sys.modules))
 import studyrunner.run
 late = {'matplotlib', 'netCDF4', 'pandas', 'rich', 'xarray'}
 late |= {'scipy.optimize', 'scipy.spatial', 'scipy.special', 'scipy.stats'}
 print(late & set(sys.modules))
+import fretwear, xarray
+print({'scipy.stats', 'studyrunner.accessor'} & set(sys.modules))
+xarray.Dataset().fretwear.surfaces
 """
-    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=True)
-    assert done.stdout.split() == ["set()", "set()"]
+    done = subprocess.run([sys.executable, "-c", code], cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.stdout.split() == ["set()"] * 4
+    assert "ValueError: The dataset holds no contact_surface" in done.stderr
 
 
 # --- the pages ---

@@ -17,7 +17,7 @@ from solver.missions.passage import LARGEST_SWEEP_RATE, run_passage
 from solver.missions.step import MissionStep, attempt_step, values_of
 from solver.model import FloatArray
 from solver.newton.run import Run, guarded
-from solver.outcome import Outcome, absolute, known_to
+from solver.outcome import Outcome, absolute, is_known_to
 from solver.packing import Packed, packable
 from solver.results.history import StartState, describe_cut_off, describe_uncertain, last_error, verdict
 from solver.settings import SHARE_OF_CAUSE, Passage
@@ -260,7 +260,7 @@ def _judged(mission: MissionRequest, state: MissionState, history: MissionHistor
     cut_off = describe_cut_off(state.cut_off_from, "mission") if state.cut_off_from < math.inf else ""
     if inaccurate.any():
         name = mission.called(int(inaccurate.argmax()))
-        about_state = f"in {name} the vibration {known_to(float(inaccurate.max()), rtol)}"
+        about_state = f"in {name} the vibration {is_known_to(float(inaccurate.max()), rtol)}"
         # an unknown stability is an infinite error, too
         about_state += ", or whether it is stable" * bool(np.isinf(inaccurate.max()))
     if state.held_from < math.inf:

@@ -24,7 +24,7 @@ from solver.loading_history.sweep import Sweep
 from solver.model import BoolArray, ComplexArray, FloatArray, ReducedModel
 from solver.modes.mode import TOP_BASE, ModeState, NonlinearMode, Rest, find_rest
 from solver.newton.run import Budget, Run, guarded
-from solver.outcome import Ended, Outcome, known_to
+from solver.outcome import Ended, Outcome, is_known_to
 from solver.settings import ROUND_OFF, Resolution, SolverSettings
 
 Direction = Literal["up", "down"]
@@ -189,7 +189,7 @@ def _judged(mode: NonlinearMode, found: ModeState, sweep: Sweep[ModeState] | Non
     by_friction = float(joint.law.friction_work(at).sum()) / (2.0 * np.pi * (found.omega * found.parameter) ** 2)
     damping = max(by_friction, abs(found.damping_ratio), ROUND_OFF)
     known = {"natural frequency": float(errors[0]) / found.omega, "damping ratio": float(errors[1]) / damping}
-    said = [f"the {name} {known_to(error, settings.rtol)}" for name, error in known.items() if error > settings.rtol]
+    said = [f"the {name} {is_known_to(error, settings.rtol)}" for name, error in known.items() if error > settings.rtol]
     return ModePoint(
         outcome=Outcome.INACCURATE if said else Outcome.CONVERGED,
         message="; ".join(said),

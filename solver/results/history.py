@@ -7,7 +7,7 @@ import numpy as np
 
 from solver.accuracy.resolved_state import Estimate
 from solver.model import ComplexArray, ContactInterface, FloatArray, IntArray
-from solver.outcome import SENSITIVE_ERROR, Ended, Outcome, in_digits, known_to
+from solver.outcome import SENSITIVE_ERROR, Ended, Outcome, in_digits, is_known_to, known_to
 from solver.packing import packable
 from solver.presentation import Presented
 from solver.settings import NEGLIGIBLE, Resolution
@@ -170,7 +170,7 @@ def judge(history: WearHistory, rows: IntArray, rtol: float, slower: float = 1.0
     # inf means "never", but is the count of a final state, too
     if math.inf > history.inaccurate_from <= at:
         begin = f"from cycle {history.inaccurate_from / slower:,.0f} on ".replace(",", " ")
-        inaccurate = begin + f"the {history.inaccurate_in} {known_to(history.inaccurate_error, rtol)}"
+        inaccurate = begin + f"the {history.inaccurate_in} {is_known_to(history.inaccurate_error, rtol)}"
     if math.inf > history.held_from <= at:
         held = (
             f"from cycle {in_digits(history.held_from / slower)} on every pair slips and only friction holds the joint"
@@ -218,7 +218,7 @@ def describe_uncertain(volume: float, other: float, error: float, rtol: float, c
         ends = f"{coarser} the history ends early: {reason}"
         why = ends if reason else "that of a vibration on the way is not known"
         return f"the error of the worn volume is not known: {why}"
-    known = known_to(error, rtol).removeprefix("is ") if error < 1.0 else "not known"
+    known = known_to(error, rtol) if error < 1.0 else "not known"
     volumes, others = f"worn volume {1e9 * volume:.3g} mm3", f"{1e9 * other:.3g} mm3 {coarser}"
     if abs(volume - other) < 0.5 * error * volume:
         return f"{volumes}, {known}, by its harmonics, its steps, or pairs that wear otherwise: {others}"

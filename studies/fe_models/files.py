@@ -159,12 +159,11 @@ def library_errors(path: Path, library: str, package: str, key: str) -> Iterator
     except ImportError as error:
         found = f"{path.name} needs the library {library}, which does not load ({error})"
         raise SceneError(key, found, f"install the library: pip install {package}") from None
-    # the libraries raise anything for a file that they do not understand, and meshio calls sys.exit
-    except (Exception, SystemExit) as error:
+    # the libraries raise anything for a file that they do not understand
+    except Exception as error:
         # errors of Python itself say nothing about the file
-        reason = said.getvalue() if isinstance(error, SystemExit) else str(error)
-        known = isinstance(error, SystemExit) or type(error).__module__ != "builtins"
-        clean = _printable(" ".join(reason.split()))
+        known = type(error).__module__ != "builtins"
+        clean = _printable(" ".join(str(error).split()))
         why = f" ({clean[:_LONGEST_REASON]})" if clean and known else ""
         found = f"{path.name} is damaged, or of a kind that {library} does not know{why}"
         raise SceneError(key, found, "write it again") from error

@@ -4,8 +4,8 @@ import cmath
 from dataclasses import dataclass
 
 import numpy as np
+import scipy  # whose parts are loaded at their first use
 from scipy import sparse
-from scipy.spatial import cKDTree
 
 from solver.model import FloatArray, IntArray
 from studies.finite_element.solid_mesh import SolidMesh
@@ -90,7 +90,7 @@ def match_cut_faces(mesh: SolidMesh, axis: CyclicAxis, first: IntArray, second: 
         remedy = "give the number of sectors and the axis of the mesh"
         raise SceneError("n_sectors", f"{found} {np.degrees(angle):.4g}", remedy)
     left, right = (first, second) if apart > 0.0 else (second, first)
-    spacing = cKDTree(coordinates[left]).query(coordinates[left], k=2)[0][:, 1]
+    spacing = scipy.spatial.cKDTree(coordinates[left]).query(coordinates[left], k=2)[0][:, 1]
     tolerance = _SAME * (np.median(spacing) if len(left) > 1 else np.ptp(coordinates, axis=0).max())
     image = _images(mesh, axis, left, right, float(tolerance))
     for lonely, other in ((left[image < 0], right), (np.setdiff1d(right, image), left)):
@@ -120,7 +120,7 @@ def _images(mesh: SolidMesh, axis: CyclicAxis, left: IntArray, right: IntArray, 
     """Of each left node (n,) the right one of its body that it turns into, -1 where none is in the tolerance, m."""
     turned, bodies = axis.turned(mesh.coordinates[left], 1), mesh.bodies
     image = np.full(len(left), -1)
-    for place, found in enumerate(cKDTree(mesh.coordinates[right]).query_ball_point(turned, tolerance)):
+    for place, found in enumerate(scipy.spatial.cKDTree(mesh.coordinates[right]).query_ball_point(turned, tolerance)):
         candidates = right[found]
         if len(candidates) > 1:
             candidates = candidates[bodies[candidates] == bodies[left[place]]]

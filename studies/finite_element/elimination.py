@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 from scipy import sparse
 from scipy.linalg import blas, eigvalsh, lapack
@@ -138,7 +137,9 @@ def factorise(matrix: sparse.csr_matrix, dissection: Dissection, rounding: float
     for number, front in enumerate(dissection.fronts):
         whole = _gathered(ordered, front)
         for child in front.children:
-            _add(whole, waiting.pop(child), _places(front, dissection.fronts[child].boundary))
+            places = _places(front, dissection.fronts[child].boundary)
+            # transposed, as it is in memory; what is above the diagonal counts for nothing
+            whole.T[np.ix_(places, places)] += waiting.pop(child).T
         lower, below, waiting[number] = _eliminate(whole, front.stop - front.first, rounding)
         blocks.append((lower, below))
     return Factor(dissection, tuple(blocks))
@@ -240,15 +241,6 @@ def _gathered(ordered: sparse.csc_matrix, front: Front) -> Dense:
     whole = np.zeros((size, size), dtype=ordered.dtype, order="F")
     whole[_places(front, rows[inside]), columns[inside]] = ordered.data[part][inside]
     return whole
-
-
-@njit(cache=True)
-def _add(whole, part, places):  # type: ignore[no-untyped-def]
-    """Adds the lower triangle of a child's part (g, g) to a front at ascending places (g,)."""
-    for column in range(len(places)):
-        source, target = part[:, column], whole[:, places[column]]
-        for row in range(column, len(places)):
-            target[places[row]] += source[row]
 
 
 def _eliminate(whole: Dense, e: int, rounding: float) -> tuple[Dense, Dense, Dense]:

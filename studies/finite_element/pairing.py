@@ -4,8 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+import scipy  # whose parts are loaded at their first use
 from scipy import sparse
-from scipy.spatial import cKDTree
 
 from solver.model import BoolArray, FloatArray, IntArray
 from studies.finite_element.cut_faces import CyclicAxis
@@ -188,7 +188,7 @@ def match_nodes(
             raise SceneError("contact", f"{found} {mesh.numbers[unknown[0]]}", "give both in the table of nodes")
         there = contact.beside(coordinates, axis)
         near = np.arange(1, 1 + min(_NEIGHBOURS, len(others)))
-        distances, nearest = cKDTree(there[others]).query(coordinates[nodes], near)
+        distances, nearest = scipy.spatial.cKDTree(there[others]).query(coordinates[nodes], near)
         apart = distances[:, 0]
         limit = contact.tolerance or _TOLERANCE * float(np.sqrt(area[nodes].min()))
         _check_near(contact, apart, limit, mesh, "give nodes that meet, node by node, or a larger tolerance")

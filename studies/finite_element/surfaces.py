@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy import sparse
 
-from solver.model import FloatArray, IntArray
+from solver.model import BoolArray, FloatArray, IntArray
 from studies.finite_element.elements import CORNERS, ELEMENT_KINDS, HEX_8, HEX_20, TET_4, TET_10, ReferenceElement
 from studies.finite_element.solid_mesh import SolidMesh
 from studies.scene import SurfaceMesh
@@ -172,7 +172,7 @@ def surface_of_nodes(mesh: SolidMesh, name: str, nodes: IntArray) -> Surface:
     """Surface of the outer faces whose nodes are all among these (n,). Raises SceneError where one is on no face."""
     inside = np.zeros(mesh.n_nodes, dtype=np.bool_)
     inside[nodes] = True
-    surface = _surface(mesh, name, [face for face in outer_faces(mesh) if inside[face.nodes].all()])
+    surface = _surface(mesh, name, [face for face in outer_faces(mesh, inside) if inside[face.nodes].all()])
     lonely = np.setdiff1d(nodes, surface.nodes)
     if len(lonely):
         found = f"{len(lonely)} of {len(nodes)} nodes of {name} belong to no face with all nodes in the set, as node"
@@ -187,17 +187,18 @@ def surface_of_points(name: str, nodes: IntArray) -> Surface:
     return Surface(name, np.tile(nodes[:, None], 4), np.full((n, 8), -1), np.zeros((n, 4, 2)), np.zeros(n))
 
 
-def outer_faces(mesh: SolidMesh) -> list[Face]:
-    """Faces of one element only."""
+def outer_faces(mesh: SolidMesh, among: BoolArray) -> list[Face]:
+    """Faces of one element only, their corners among these nodes (n_nodes,)."""
     faces: list[Face] = []
     keys: list[IntArray] = []
     for group in mesh.groups:
         for face in ELEMENT_KINDS[group.kind].faces:
-            nodes = group.nodes[:, list(face)]
             n_corners = 3 if len(face) in (3, 6) else 4
-            key = np.full((len(nodes), 4), -1)
-            key[:, :n_corners] = nodes[:, :n_corners]
-            faces += [Face(loop, element, group.part) for loop, element in zip(nodes, group.nodes, strict=True)]
+            corners = group.nodes[:, list(face[:n_corners])]
+            chosen = group.nodes[among[corners].all(axis=1)]
+            faces += [Face(element[list(face)], element, group.part) for element in chosen]
+            key = np.full((len(chosen), 4), -1)
+            key[:, :n_corners] = chosen[:, list(face[:n_corners])]
             keys.append(np.sort(key, axis=1))
     _, first, count = np.unique(np.concatenate(keys), axis=0, return_index=True, return_counts=True)
     return [faces[place] for place in np.sort(first[count == 1])]
@@ -205,7 +206,7 @@ def outer_faces(mesh: SolidMesh) -> list[Face]:
 
 def describe_mesh(mesh: SolidMesh) -> SurfaceMesh:
     """Outer faces of a mesh by their corners, for pictures; triangles repeat their last corner."""
-    outer = outer_faces(mesh)
+    outer = outer_faces(mesh, np.ones(mesh.n_nodes, dtype=np.bool_))
     corners = np.array([face.nodes[[0, 1, 2, 2 if len(face.nodes) in (3, 6) else 3]] for face in outer])
     used, quads = np.unique(corners, return_inverse=True)
     return SurfaceMesh(mesh.coordinates[used], quads.reshape(corners.shape), tuple(face.part for face in outer))

@@ -7,12 +7,13 @@ halves, a depth is the sum of both bodies. A stroke has to be small against the 
 that of Hertz, the stick zone that of Cattaneo; partial slip wears to a known profile.
 """
 
-from typing import ClassVar, Self
+from typing import Annotated, ClassVar, Self
 
 import numpy as np
 from pydantic import Field, model_validator
 
 from solver.model import FloatArray, ReducedModel
+from studies.scene import Metre, NewtonPerMetre, Remark
 from studies.scene_error import SceneError
 from studies.scenes.half_space import PressedBody, strip_compliance, worn_edge
 
@@ -46,23 +47,19 @@ class Parameters(PressedBody):
     SCAR: ClassVar = (3, 1.5)
     worn_depth: ClassVar = staticmethod(line_worn_depth)
 
-    R: float = Field(6e-3, gt=0, description="radius of the cylinder, m")
-    P: float = Field(1.2e5, gt=0, description="normal force per length, N/m")
-    Q: float | None = Field(
-        None, gt=0, description="amplitude of the tangential force per length, N/m; mu P / 2 where no stroke is given"
+    R: Metre = Field(6e-3, gt=0, description="radius of the cylinder")
+    P: NewtonPerMetre = Field(1.2e5, gt=0, description="normal force per length")
+    Q: Annotated[NewtonPerMetre | None, Remark("mu P / 2 where no stroke is given")] = Field(
+        None, gt=0, description="amplitude of the tangential force per length"
     )
-    length: float = Field(0.01, gt=0, description="length of the cylinder, m")
+    length: Metre = Field(0.01, gt=0, description="length of the cylinder")
     strips: int = Field(100, ge=4, le=800, multiple_of=2, description="number of strips, of both halves")
-    half_width: float | None = Field(
-        None,
-        gt=0,
-        description="half of the width of all strips, m; default: what the worn contact needs, in a study;"
-        " without a study, for a sliding stroke, 1.5 times the unworn contact",
-    )
-    depth: float | None = Field(
-        None,
-        gt=0,
-        description="depth that displacements refer to, m, larger than the width of all strips; default: R",
+    half_width: Annotated[
+        Metre | None,
+        Remark("default: what a study needs; alone, where the contact slides, 1.5 times the unworn contact"),
+    ] = Field(None, gt=0, description="half of the width of all strips")
+    depth: Annotated[Metre | None, Remark("default: R")] = Field(
+        None, gt=0, description="depth that displacements refer to, larger than the width of all strips"
     )
 
     @model_validator(mode="after")

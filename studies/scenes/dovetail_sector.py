@@ -14,7 +14,7 @@ turns about +z), then extrados; from the leading to the trailing edge; from the 
 from collections.abc import Iterator
 from dataclasses import replace
 from math import asin, atan2, cos, hypot, pi, radians, sin, sqrt, tan
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -23,6 +23,7 @@ from solver.model import FloatArray, IntArray
 from studies.finite_element.pairing import ContactPairs, ContactSurfaces, build_contact_pairs
 from studies.finite_element.structure import FeModel, JointDefinition, Retainer
 from studies.finite_element.surfaces import surface_of_nodes
+from studies.scene import Degree, Metre, NewtonPerMetre, Remark, Rpm
 from studies.scenes.sector import AXIS, SectorParameters, block_of, graded, mesh_of_bodies
 
 _TRAVELLING_RETAINER = 1e7  # N/m: stiff against the slip of the flanks, soft against the flanks themselves
@@ -46,49 +47,47 @@ class Parameters(SectorParameters):
         "platform_radius",
     )
 
-    friction_coefficient: float = Field(0.5, ge=0, description="Coulomb friction coefficient of the flanks, -")
-    rotation_speed: float = Field(3000.0, gt=0, description="speed of rotation, which presses the flanks together, rpm")
-    n_sectors: int = Field(47, ge=12, le=200, description="number of blades, -")
-    retention_stiffness: float | None = Field(
-        None,
-        ge=0,
-        description="retainer along the slot; default 1e7 under a travelling wave and else 0, N/m",
+    friction_coefficient: float = Field(0.5, ge=0, description="Coulomb friction coefficient of the flanks")
+    rotation_speed: Rpm = Field(3000.0, gt=0, description="speed of rotation, which presses the flanks together")
+    n_sectors: int = Field(47, ge=12, le=200, description="number of blades")
+    retention_stiffness: Annotated[NewtonPerMetre | None, Remark("default 1e7 under a travelling wave and else 0")] = (
+        Field(None, ge=0, description="retainer along the slot")
     )
-    mesh: int = Field(2, ge=1, le=8, description="mesh density m: a flank has 4 m axial x (m + 1) contact pairs, -")
-    bore_radius: float = Field(0.120, gt=0, description="radius of the clamped bore, m")
-    hub_radius: float = Field(0.125, gt=0, description="outer radius of the hub, m")
-    web_inner_radius: float = Field(0.146, gt=0, description="radius where the web has become thin, m")
-    web_outer_radius: float = Field(0.202, gt=0, description="radius where the web begins to widen to the rim, m")
-    rim_inner_radius: float = Field(0.212, gt=0, description="inner radius of the rim, m")
-    slot_bottom_radius: float = Field(0.234, gt=0, description="radius of the slot bottom, m")
-    rim_radius: float = Field(0.250, gt=0, description="outer radius of the disk, m")
-    hub_width: float = Field(0.036, gt=0, description="axial width of the hub, m")
-    web_width: float = Field(0.014, gt=0, description="axial width of the web, m")
-    rim_width: float = Field(0.040, gt=0, description="axial width of rim, root and platform, m")
+    mesh: int = Field(2, ge=1, le=8, description="mesh density m: a flank has 4 m axial x (m + 1) contact pairs")
+    bore_radius: Metre = Field(0.120, gt=0, description="radius of the clamped bore")
+    hub_radius: Metre = Field(0.125, gt=0, description="outer radius of the hub")
+    web_inner_radius: Metre = Field(0.146, gt=0, description="radius where the web has become thin")
+    web_outer_radius: Metre = Field(0.202, gt=0, description="radius where the web begins to widen to the rim")
+    rim_inner_radius: Metre = Field(0.212, gt=0, description="inner radius of the rim")
+    slot_bottom_radius: Metre = Field(0.234, gt=0, description="radius of the slot bottom")
+    rim_radius: Metre = Field(0.250, gt=0, description="outer radius of the disk")
+    hub_width: Metre = Field(0.036, gt=0, description="axial width of the hub")
+    web_width: Metre = Field(0.014, gt=0, description="axial width of the web")
+    rim_width: Metre = Field(0.040, gt=0, description="axial width of rim, root and platform")
 
-    flank_top_radius: float = Field(0.245, gt=0, description="radius of the outer end of the flanks, m")
-    flank_top_half_width: float = Field(0.0055, gt=0, description="half width of the root at that end, m")
-    flank_length: float = Field(0.007, gt=0, description="length of a flank in the cross-section, m")
-    flank_angle: float = Field(45.0, ge=15, le=75, description="angle between flank and radius, degrees")
-    root_clearance: float = Field(0.0012, gt=0, description="clearance of the root at bottom and sides, m")
-    mouth_clearance: float = Field(0.0006, gt=0, description="clearance of the neck at the rim radius, m")
+    flank_top_radius: Metre = Field(0.245, gt=0, description="radius of the outer end of the flanks")
+    flank_top_half_width: Metre = Field(0.0055, gt=0, description="half width of the root at that end")
+    flank_length: Metre = Field(0.007, gt=0, description="length of a flank in the cross-section")
+    flank_angle: Degree = Field(45.0, ge=15, le=75, description="angle between flank and radius")
+    root_clearance: Metre = Field(0.0012, gt=0, description="clearance of the root at bottom and sides")
+    mouth_clearance: Metre = Field(0.0006, gt=0, description="clearance of the neck at the rim radius")
 
-    platform_radius: float = Field(0.2525, gt=0, description="radius of the underside of the platform, m")
-    platform_thickness: float = Field(0.0025, gt=0, description="thickness of the platform, m")
-    platform_gap: float = Field(0.0006, gt=0, description="gap between neighbouring platforms, m")
+    platform_radius: Metre = Field(0.2525, gt=0, description="radius of the underside of the platform")
+    platform_thickness: Metre = Field(0.0025, gt=0, description="thickness of the platform")
+    platform_gap: Metre = Field(0.0006, gt=0, description="gap between neighbouring platforms")
 
-    blade_length: float = Field(0.160, gt=0, description="length of the blade above the platform, m")
-    root_chord: float = Field(0.042, gt=0, description="chord at the foot of the blade, m")
-    tip_chord: float = Field(0.040, gt=0, description="chord at the tip, m")
-    root_thickness: float = Field(0.0055, gt=0, description="thickness in mid-chord at the foot of the blade, m")
-    tip_thickness: float = Field(0.0026, gt=0, description="thickness in mid-chord at the tip, m")
+    blade_length: Metre = Field(0.160, gt=0, description="length of the blade above the platform")
+    root_chord: Metre = Field(0.042, gt=0, description="chord at the foot of the blade")
+    tip_chord: Metre = Field(0.040, gt=0, description="chord at the tip")
+    root_thickness: Metre = Field(0.0055, gt=0, description="thickness in mid-chord at the foot of the blade")
+    tip_thickness: Metre = Field(0.0026, gt=0, description="thickness in mid-chord at the tip")
     root_edge_thickness: float = Field(
-        0.90, gt=0, le=1, description="thickness of the edges at the foot over that in mid-chord, -"
+        0.90, gt=0, le=1, description="thickness of the edges at the foot over that in mid-chord"
     )
-    tip_edge_thickness: float = Field(0.78, gt=0, le=1, description="the same ratio at the tip, -")
-    root_stagger: float = Field(12.0, ge=-80, le=80, description="angle of chord to axis at the foot, degrees")
-    tip_stagger: float = Field(48.0, ge=-80, le=80, description="angle of chord to axis at the tip, degrees")
-    fillet_height: float = Field(0.008, gt=0, description="height over which the neck blends into the blade, m")
+    tip_edge_thickness: float = Field(0.78, gt=0, le=1, description="the same ratio at the tip")
+    root_stagger: Degree = Field(12.0, ge=-80, le=80, description="angle of chord to axis at the foot")
+    tip_stagger: Degree = Field(48.0, ge=-80, le=80, description="angle of chord to axis at the tip")
+    fillet_height: Metre = Field(0.008, gt=0, description="height over which the neck blends into the blade")
 
     @property
     def flank_bottom(self) -> tuple[float, float]:

@@ -18,7 +18,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from solver.model import BoolArray, ContactInterface, FloatArray, LinearModel, ReducedModel
-from studies.scene import ExpectedWear, Scene
+from studies.scene import ExpectedWear, Metre, Pascal, Scene
 from studies.scene_error import SceneError
 
 _FARTHEST = 20.0  # of the contact: beyond what slip up to 0.9999 of sliding wears
@@ -104,18 +104,18 @@ class PressedBody(Scene):
     SCAR: ClassVar[tuple[int, float]]
     worn_depth: ClassVar[Callable[..., FloatArray]]
 
-    friction_coefficient: float = Field(0.6, ge=0, description="Coulomb friction coefficient mu, 1")
+    friction_coefficient: float = Field(0.6, ge=0, description="Coulomb friction coefficient mu")
     R: float
     P: float
     Q: float | None
-    stroke: float | None = Field(
-        None, gt=0, description="amplitude of the motion of the body in place of Q, m: it shears, and slides by less"
+    stroke: Metre | None = Field(
+        None, gt=0, description="amplitude of the motion of the body in place of Q: it shears, and slides by less"
     )
-    sliding: float | None = Field(
-        None, gt=0, description="amplitude by which all of the contact slides, in place of Q or stroke, m"
+    sliding: Metre | None = Field(
+        None, gt=0, description="amplitude by which all of the contact slides, in place of Q or stroke"
     )
-    E: float = Field(200e9, gt=0, description="Young's modulus of both bodies, Pa")
-    nu: float = Field(0.3, ge=0, lt=0.5, description="Poisson's ratio of both bodies, 1")
+    E: Pascal = Field(200e9, gt=0, description="Young's modulus of both bodies")
+    nu: float = Field(0.3, ge=0, lt=0.5, description="Poisson's ratio of both bodies")
     half_width: float | None
 
     @model_validator(mode="after")

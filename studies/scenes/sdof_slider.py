@@ -9,7 +9,7 @@ stops, the motion is that of Den Hartog, Trans. ASME 53 (1931).
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -17,7 +17,7 @@ from pydantic import Field
 from solver.contact.wear_law import ARCHARD, WearingWork, WearLaw, wearing_work
 from solver.model import FloatArray, ReducedModel, with_friction
 from solver.model_from_matrices import build_model
-from studies.scene import Scene
+from studies.scene import Damping, Kilogram, Newton, NewtonPerMetre, Remark, Scene, SquareMetre
 
 _SINGULAR = 1e-9  # 1/r beside an odd number, where G has no bound
 _POINTS = 4001  # in a half period, among which the slowest moment of the motion is sought
@@ -154,14 +154,14 @@ class Parameters(Scene):
 
     OFFERS: ClassVar = ("exact",)
 
-    mass: float = Field(0.1, gt=0, description="mass, kg")
-    damping: float = Field(0.0, ge=0, description="viscous damping of the mount, N s/m")
-    stiffness: float = Field(1.6e5, gt=0, description="tangential stiffness of the mount, N/m")
-    normal_load: float = Field(10.0, gt=0, description="normal force without wear, of a rigid contact, N")
-    normal_stiffness: float = Field(
-        1e5, ge=0, description="stiffness of the spring that presses, N/m; 0: the normal force is constant"
+    mass: Kilogram = Field(0.1, gt=0, description="mass")
+    damping: Damping = Field(0.0, ge=0, description="viscous damping of the mount")
+    stiffness: NewtonPerMetre = Field(1.6e5, gt=0, description="tangential stiffness of the mount")
+    normal_load: Newton = Field(10.0, gt=0, description="normal force without wear, of a rigid contact")
+    normal_stiffness: Annotated[NewtonPerMetre, Remark("0: the normal force is constant")] = Field(
+        1e5, ge=0, description="stiffness of the spring that presses"
     )
-    area: float = Field(1e-4, gt=0, description="contact area, m2")
+    area: SquareMetre = Field(1e-4, gt=0, description="contact area")
 
     def build(self, _: int) -> ReducedModel:
         """The response is the displacement of the mass, on which the load acts.

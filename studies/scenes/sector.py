@@ -7,9 +7,6 @@ from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
-from scipy.spatial import cKDTree
 
 from solver.model import FloatArray, IntArray, ReducedModel
 from studies.finite_element.cut_faces import CutFaces, CyclicAxis
@@ -18,7 +15,7 @@ from studies.finite_element.reduced_joint import build_fe_scene, prepare_model
 from studies.finite_element.solid_mesh import ElementGroup, Material, Rotation, SolidMesh
 from studies.finite_element.structure import FeModel, JointDefinition, ReductionOptions, Retainer, mean_motion
 from studies.finite_element.surfaces import describe_mesh
-from studies.scene import N_MODES, Scene, SurfaceMesh, lowest
+from studies.scene import N_MODES, Density, Pascal, Rpm, Scene, SurfaceMesh, lowest
 from studies.scene_error import SceneError
 
 _SAME_NODE = 1e-9  # points closer than this, in m, are one node
@@ -34,16 +31,16 @@ class SectorParameters(Scene):
     OFFERS: ClassVar = ("mesh",)
     ASCENDING: ClassVar[tuple[str, ...]]
 
-    rotation_speed: float = Field(3000.0, ge=0, description="speed of rotation, rpm")
-    nodal_diameter: int = Field(0, ge=0, description="nodal diameter of the travelling wave that excites the blades, -")
-    loss_factor: float = Field(1e-3, ge=0, description="loss factor of the material, exact at the first frequency, -")
-    stress_stiffening: bool = Field(True, description="stress stiffening and spin softening by the rotation, -")
-    stuck_modes: int = Field(20, ge=1, le=100, description="modes of the glued sector kept in the reduction, -")
+    rotation_speed: Rpm = Field(3000.0, ge=0, description="speed of rotation")
+    nodal_diameter: int = Field(0, ge=0, description="nodal diameter of the travelling wave that excites the blades")
+    loss_factor: float = Field(1e-3, ge=0, description="loss factor of the material, exact at the first frequency")
+    stress_stiffening: bool = Field(True, description="stress stiffening and spin softening by the rotation")
+    stuck_modes: int = Field(20, ge=1, le=100, description="modes of the glued sector kept in the reduction")
 
-    n_sectors: int = Field(60, ge=4, le=200, description="number of blades, -")
-    young_modulus: float = Field(114e9, gt=0, description="Young's modulus, Pa")
-    poisson_ratio: float = Field(0.32, ge=0, lt=0.5, description="Poisson's ratio, -")
-    density: float = Field(4430.0, gt=0, description="density, kg/m3")
+    n_sectors: int = Field(60, ge=4, le=200, description="number of blades")
+    young_modulus: Pascal = Field(114e9, gt=0, description="Young's modulus")
+    poisson_ratio: float = Field(0.32, ge=0, lt=0.5, description="Poisson's ratio")
+    density: Density = Field(4430.0, gt=0, description="density")
 
     @property
     def half_pitch(self) -> float:
@@ -130,10 +127,9 @@ def mesh_of_bodies(
     n_nodes = n_elements = 0
     for blocks, parts, material in bodies:
         points = np.concatenate([block.reshape(-1, 3) for block in blocks])
-        pairs = cKDTree(points).query_pairs(_SAME_NODE, output_type="ndarray")
-        touching = coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(len(points), len(points)))
-        _, node = connected_components(touching, directed=False)
-        _, first = np.unique(node, return_index=True)
+        places = np.round(points / _SAME_NODE).astype(np.int64)
+        _, first, place = np.unique(places, axis=0, return_index=True, return_inverse=True)
+        node = np.argsort(np.argsort(first))[place.ravel()]  # numbered as they first appear
         ends = np.cumsum([0] + [block[..., 0].size for block in blocks])
         for block, part, (start, end) in zip(blocks, parts, pairwise(ends), strict=True):
             grids.append(n_nodes + node[start:end].reshape(block.shape[:3]).astype(np.int64))
@@ -141,7 +137,7 @@ def mesh_of_bodies(
             numbers = n_elements + np.arange(len(cells)) + 1
             groups.append(ElementGroup("C3D8I", cells, numbers, material, part))
             n_elements += len(cells)
-        nodes.append(points[first])
+        nodes.append(points[np.sort(first)])
         n_nodes += len(first)
     return SolidMesh(np.concatenate(nodes), np.arange(n_nodes) + 1, tuple(groups)), tuple(grids)
 

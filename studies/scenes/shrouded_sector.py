@@ -21,6 +21,7 @@ from solver.model import FloatArray
 from studies.finite_element import surfaces
 from studies.finite_element.pairing import ContactSurfaces
 from studies.finite_element.structure import FeModel, JointDefinition
+from studies.scene import Degree, Metre
 from studies.scenes.sector import SectorParameters, block_of, graded, mesh_of_bodies
 
 
@@ -29,19 +30,17 @@ class Parameters(SectorParameters):
 
     ASCENDING: ClassVar = ("bore_radius", "rim_radius")
 
-    friction_coefficient: float = Field(0.3, ge=0, description="Coulomb friction coefficient of the shrouds, -")
-    interference: float = Field(
-        5e-4, ge=0, description="overlap of neighbouring shrouds before they are put together, m"
-    )
-    mesh: int = Field(1, ge=1, le=8, description="mesh density m: a shroud has 4 m axial x (m + 1) contact pairs, -")
-    bore_radius: float = Field(0.12, gt=0, description="radius of the clamped bore, m")
-    rim_radius: float = Field(0.2, gt=0, description="outer radius of the disk, m")
-    width: float = Field(0.03, gt=0, description="axial width of disk, blade and shroud, m")
-    blade_length: float = Field(0.16, gt=0, description="length of the blade between disk and shroud, m")
-    blade_thickness: float = Field(0.004, gt=0, description="thickness of the blade, m")
-    root_angle: float = Field(10.0, ge=-60, le=60, description="angle of the blade to the axis at the disk, degrees")
-    shroud_angle: float = Field(35.0, ge=-60, le=60, description="angle of blade and contact faces at the tip, degrees")
-    shroud_thickness: float = Field(0.006, gt=0, description="radial thickness of the shroud, m")
+    friction_coefficient: float = Field(0.3, ge=0, description="Coulomb friction coefficient of the shrouds")
+    interference: Metre = Field(5e-4, ge=0, description="overlap of neighbouring shrouds before they are put together")
+    mesh: int = Field(1, ge=1, le=8, description="mesh density m: a shroud has 4 m axial x (m + 1) contact pairs")
+    bore_radius: Metre = Field(0.12, gt=0, description="radius of the clamped bore")
+    rim_radius: Metre = Field(0.2, gt=0, description="outer radius of the disk")
+    width: Metre = Field(0.03, gt=0, description="axial width of disk, blade and shroud")
+    blade_length: Metre = Field(0.16, gt=0, description="length of the blade between disk and shroud")
+    blade_thickness: Metre = Field(0.004, gt=0, description="thickness of the blade")
+    root_angle: Degree = Field(10.0, ge=-60, le=60, description="angle of the blade to the axis at the disk")
+    shroud_angle: Degree = Field(35.0, ge=-60, le=60, description="angle of blade and contact faces at the tip")
+    shroud_thickness: Metre = Field(0.006, gt=0, description="radial thickness of the shroud")
 
     def define_sector(self) -> tuple[FeModel, JointDefinition]:  # noqa: D102
         self.check()

@@ -5,12 +5,13 @@ patch also stands for its mirror images (`half_space`). Areas, forces and volume
 stick zone is that of Cattaneo and Mindlin, without tractions across the force.
 """
 
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field
 
 from solver.model import FloatArray, ReducedModel
+from studies.scene import Metre, Newton, Remark
 from studies.scenes.half_space import PressedBody, patch_compliance, worn_edge
 
 _WIDER = 0.11
@@ -47,18 +48,16 @@ class Parameters(PressedBody):
     SCAR: ClassVar = (4, 4.0 / np.pi)
     worn_depth: ClassVar = staticmethod(point_worn_depth)
 
-    R: float = Field(10e-3, gt=0, description="radius of the sphere, m")
-    P: float = Field(100.0, gt=0, description="normal force, N")
-    Q: float | None = Field(
-        None, gt=0, description="amplitude of the tangential force, N; mu P / 2 where no stroke is given"
+    R: Metre = Field(10e-3, gt=0, description="radius of the sphere")
+    P: Newton = Field(100.0, gt=0, description="normal force")
+    Q: Annotated[Newton | None, Remark("mu P / 2 where no stroke is given")] = Field(
+        None, gt=0, description="amplitude of the tangential force"
     )
     patches: int = Field(10, ge=2, le=40, description="number of patches, along a radius of the patched circle")
-    half_width: float | None = Field(
-        None,
-        gt=0,
-        description="radius of the patched circle, m; default: what the worn contact needs, in a study;"
-        " without a study, for a sliding stroke, 1.4 times the unworn contact",
-    )
+    half_width: Annotated[
+        Metre | None,
+        Remark("default: what a study needs; alone, where the contact slides, 1.4 times the unworn contact"),
+    ] = Field(None, gt=0, description="radius of the patched circle")
 
     @property
     def contact(self) -> float:

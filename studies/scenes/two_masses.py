@@ -9,20 +9,20 @@ from pydantic import Field
 
 from solver.model import FloatArray, ReducedModel
 from solver.model_from_matrices import build_model
-from studies.scene import Scene
+from studies.scene import Damping, Kilogram, Newton, NewtonPerMetre, Scene, SquareMetre
 
 
 class Parameters(Scene):
     """The defaults resonate at 0.098 and 0.257 Hz without friction; the friction force, 7.2 N, suits about 20 N."""
 
-    mass_1: float = Field(1.0, gt=0, description="mass that is excited, kg")
-    mass_2: float = Field(1.0, gt=0, description="mass that slides, kg")
-    damping_1: float = Field(0.02, ge=0, description="viscous damping between ground and mass 1, N s/m")
-    damping_2: float = Field(0.02, ge=0, description="viscous damping between the masses, N s/m")
-    stiffness_1: float = Field(1.0, gt=0, description="spring between ground and mass 1, N/m")
-    stiffness_2: float = Field(1.0, gt=0, description="spring between the masses, N/m")
-    normal_load: float = Field(14.4, gt=0, description="constant normal force on mass 2, N")
-    area: float = Field(1e-4, gt=0, description="contact area, m2")
+    mass_1: Kilogram = Field(1.0, gt=0, description="mass that is excited")
+    mass_2: Kilogram = Field(1.0, gt=0, description="mass that slides")
+    damping_1: Damping = Field(0.02, ge=0, description="viscous damping between ground and mass 1")
+    damping_2: Damping = Field(0.02, ge=0, description="viscous damping between the masses")
+    stiffness_1: NewtonPerMetre = Field(1.0, gt=0, description="spring between ground and mass 1")
+    stiffness_2: NewtonPerMetre = Field(1.0, gt=0, description="spring between the masses")
+    normal_load: Newton = Field(14.4, gt=0, description="constant normal force on mass 2")
+    area: SquareMetre = Field(1e-4, gt=0, description="contact area")
 
     def build(self, _: int) -> ReducedModel:
         """In the displacements of mass 1 and mass 2, both of which are responses."""

@@ -23,6 +23,7 @@ from studies.finite_element import surfaces
 from studies.finite_element.pairing import ContactSurfaces
 from studies.finite_element.solid_mesh import Material
 from studies.finite_element.structure import FeModel, JointDefinition, Retainer
+from studies.scene import Degree, Density, Metre, NewtonPerMetre, Rpm
 from studies.scenes.sector import AXIS, SectorParameters, block_of, graded, mesh_of_bodies
 
 
@@ -31,24 +32,24 @@ class Parameters(SectorParameters):
 
     ASCENDING: ClassVar = ("bore_radius", "rim_radius", "platform_radius")
 
-    friction_coefficient: float = Field(0.3, ge=0, description="Coulomb friction coefficient of the wedge, -")
-    rotation_speed: float = Field(3000.0, gt=0, description="speed of rotation, which presses the wedge, rpm")
-    mesh: int = Field(1, ge=1, le=8, description="mesh density m: 4 m axial x (m + 1) contact pairs on each side, -")
-    bore_radius: float = Field(0.12, gt=0, description="radius of the clamped bore, m")
-    rim_radius: float = Field(0.2, gt=0, description="outer radius of the disk, m")
-    platform_radius: float = Field(0.225, gt=0, description="radius of the underside of the platform, m")
-    platform_thickness: float = Field(0.005, gt=0, description="radial thickness of the platform, m")
-    platform_gap: float = Field(0.001, gt=0, description="gap between neighbouring platforms, m")
-    width: float = Field(0.03, gt=0, description="axial width of disk, blade, platform and wedge, m")
-    shank_thickness: float = Field(0.006, gt=0, description="thickness of the shank, and of the foot of the blade, m")
-    tip_thickness: float = Field(0.004, gt=0, description="thickness of the blade at its tip, m")
-    blade_length: float = Field(0.14, gt=0, description="length of the blade above the platform, m")
-    tip_angle: float = Field(25.0, ge=-60, le=60, description="angle of the blade to the axis at its tip, degrees")
-    roof_angle: float = Field(30.0, gt=0, lt=60, description="angle of both sides of the roof to the tangent, degrees")
-    damper_half_width: float = Field(0.005, gt=0, description="half of the tangential width of the wedge, m")
-    damper_height: float = Field(0.003, gt=0, description="radial height of the sides of the wedge, m")
-    retention_stiffness: float = Field(1e7, ge=0, description="what holds the wedge along the axis, N/m")
-    damper_density: float = Field(8000.0, gt=0, description="density of the wedge, kg/m3")
+    friction_coefficient: float = Field(0.3, ge=0, description="Coulomb friction coefficient of the wedge")
+    rotation_speed: Rpm = Field(3000.0, gt=0, description="speed of rotation, which presses the wedge")
+    mesh: int = Field(1, ge=1, le=8, description="mesh density m: 4 m axial x (m + 1) contact pairs on each side")
+    bore_radius: Metre = Field(0.12, gt=0, description="radius of the clamped bore")
+    rim_radius: Metre = Field(0.2, gt=0, description="outer radius of the disk")
+    platform_radius: Metre = Field(0.225, gt=0, description="radius of the underside of the platform")
+    platform_thickness: Metre = Field(0.005, gt=0, description="radial thickness of the platform")
+    platform_gap: Metre = Field(0.001, gt=0, description="gap between neighbouring platforms")
+    width: Metre = Field(0.03, gt=0, description="axial width of disk, blade, platform and wedge")
+    shank_thickness: Metre = Field(0.006, gt=0, description="thickness of the shank, and of the foot of the blade")
+    tip_thickness: Metre = Field(0.004, gt=0, description="thickness of the blade at its tip")
+    blade_length: Metre = Field(0.14, gt=0, description="length of the blade above the platform")
+    tip_angle: Degree = Field(25.0, ge=-60, le=60, description="angle of the blade to the axis at its tip")
+    roof_angle: Degree = Field(30.0, gt=0, lt=60, description="angle of both sides of the roof to the tangent")
+    damper_half_width: Metre = Field(0.005, gt=0, description="half of the tangential width of the wedge")
+    damper_height: Metre = Field(0.003, gt=0, description="radial height of the sides of the wedge")
+    retention_stiffness: NewtonPerMetre = Field(1e7, ge=0, description="what holds the wedge along the axis")
+    damper_density: Density = Field(8000.0, gt=0, description="density of the wedge")
 
     @property
     def roof_rise(self) -> float:

@@ -5,12 +5,14 @@ The wall is a spring to ground, whose massless tip stands `gap` away from the re
 the tip rests (`u_N = x`); closed, `u_N = gap`, and the force is `wall_stiffness (x - gap)`.
 """
 
+from typing import Annotated
+
 import numpy as np
 from pydantic import Field
 
 from solver.model import ReducedModel
 from solver.model_from_matrices import build_model
-from studies.scene import Scene
+from studies.scene import Damping, Kilogram, Metre, NewtonPerMetre, Remark, Scene, SquareMetre
 
 
 class Parameters(Scene):
@@ -19,17 +21,17 @@ class Parameters(Scene):
     With 0.02 N the response has two branches, with and without impacts, from 0.175 to 0.248 Hz.
     """
 
-    friction_coefficient: float = Field(
-        0.0, ge=0, description="Coulomb friction coefficient, 1; without influence: the pair has no tangent"
+    friction_coefficient: Annotated[float, Remark("without influence: the pair has no tangent")] = Field(
+        0.0, ge=0, description="Coulomb friction coefficient"
     )
-    mass: float = Field(1.0, gt=0, description="mass, kg")
-    damping: float = Field(0.05, ge=0, description="viscous damping of the mount, N s/m")
-    stiffness: float = Field(1.0, gt=0, description="stiffness of the mount, N/m")
-    wall_stiffness: float = Field(100.0, gt=0, description="stiffness of the wall, N/m")
-    gap: float = Field(
-        0.1, description="distance between the resting mass and the wall, m; negative: they press on each other"
+    mass: Kilogram = Field(1.0, gt=0, description="mass")
+    damping: Damping = Field(0.05, ge=0, description="viscous damping of the mount")
+    stiffness: NewtonPerMetre = Field(1.0, gt=0, description="stiffness of the mount")
+    wall_stiffness: NewtonPerMetre = Field(100.0, gt=0, description="stiffness of the wall")
+    gap: Annotated[Metre, Remark("negative: they press on each other")] = Field(
+        0.1, description="distance between the resting mass and the wall"
     )
-    area: float = Field(1e-4, gt=0, description="contact area, m2")
+    area: SquareMetre = Field(1e-4, gt=0, description="contact area")
 
     def build(self, _: int) -> ReducedModel:
         """In (closing displacement, displacement of the mass), the response."""

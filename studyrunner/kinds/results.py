@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.outcome import Outcome
-from solver.results.history import WearHistory, judge, last_error
 from solver.settings import WearTarget
 from studyrunner.kinds.task import PointResult
 from studyrunner.units import describe_reach, show_count
@@ -16,6 +15,7 @@ from studyrunner.variables import OF_A_HISTORY, OF_A_MISSION
 
 if TYPE_CHECKING:
     from solver.missions.mission import MissionHistory
+    from solver.results.history import WearHistory
     from studyrunner.kinds.missions import Mission
     from studyrunner.kinds.wear import History, Integrated
 
@@ -51,7 +51,7 @@ def named(names: Sequence[str], own: Mapping[str, Any], source: object) -> dict[
     return {name: own[name] if name in own else getattr(source, name) for name in names}
 
 
-def build_result(task: "History", integrated: "Integrated", history: WearHistory, place: int = 0) -> PointResult:
+def build_result(task: "History", integrated: "Integrated", history: "WearHistory", place: int = 0) -> PointResult:
     """One history of a task at the output counts, with the variables that the task asks for.
 
     integrated: the history that was integrated. place: number among those that are read from it.
@@ -59,6 +59,8 @@ def build_result(task: "History", integrated: "Integrated", history: WearHistory
     What is per cycle is per cycle of that history. What came after its last count has no part in it: jumps, errors, the
     end of the integrated history. Effort is that of the integrated history.
     """
+    from solver.results.history import judge, last_error  # a run alone needs it, and numba with it
+
     slower = integrated.wear_coefficients[place] / integrated.wear_coefficients[0] if place else 1.0
     endless = task.to_the_end is not None and not integrated.unworn
     counts = history.cycles if endless else np.array(integrated.counts(task.cycles, place))
@@ -102,7 +104,7 @@ def build_result(task: "History", integrated: "Integrated", history: WearHistory
 
 
 def _at_counts(
-    history: WearHistory, names: Sequence[str], slower: float, rows: NDArray[np.intp], reached: NDArray[np.bool_]
+    history: "WearHistory", names: Sequence[str], slower: float, rows: NDArray[np.intp], reached: NDArray[np.bool_]
 ) -> dict[str, NDArray[np.generic]]:
     """Variables of the result at rows of the history; NaN, or 0 in whole numbers, where not reached.
 
@@ -127,6 +129,8 @@ def _at_counts(
 
 def mission_values(task: "Mission", history: "MissionHistory") -> dict[str, Any]:
     """Variables of the result, at the numbers of missions that the task asks for."""
+    from solver.results.history import last_error
+
     counts = np.array(task.missions)
     rows, ends = (np.searchsorted(history.missions, each) for each in (counts, np.clip(counts, 1.0, None)))
     in_mission = history.block_volume[ends] - history.block_volume[ends - 1]

@@ -50,6 +50,7 @@ def parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     scar = "measured scar of a cylinder or sphere on a flat; first line x_mm,depth_um (also m, um)"
     add("--measured", metavar="PROFILE.csv", type=Path, help=scar)
     add("--no-compute", help="draw what the file holds, without the response of a worn joint", **flag)
+    add("--column", help="figures 90 mm wide, for a column of a journal or a phone (default: 190 mm)", **flag)
     add("--vtu", help="also the root over the cycles, for ParaView (extra meshio)", **flag)
     return parser.parse_args(list(arguments))
 
@@ -89,6 +90,7 @@ def _report(options: argparse.Namespace) -> int:
     # Loaded late: help and mistakes on the command line do not wait for the libraries that draw.
     began = time.monotonic()
     from studyrunner.report.contents import draw_report
+    from studyrunner.report.drawing import COLUMN_WIDTH, WIDTH
     from studyrunner.report.page import write_page
     from studyrunner.report.root import SERIES, find_writer
     from studyrunner.result.opening import reading_errors
@@ -108,7 +110,8 @@ def _report(options: argparse.Namespace) -> int:
             trial.unlink()
         result, page = _compute(result, folder, options), folder / "index.html"
         with _writing_errors(folder):
-            shown = write_page(result, draw_report(result), page)
+            width = COLUMN_WIDTH if options.column else WIDTH
+            shown = write_page(result, draw_report(result, width), page)
             n_files = write_series(folder) if write_series else 0
     print(f"{page}: {shown}, {format_seconds(time.monotonic() - began)}; open it in a browser")
     if options.vtu:

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Any, cast
+from typing import Any
 
 from studyrunner.report import drawing as plot
 from studyrunner.report.drawing import Drawing, Drawn, Item, Missing, Table, as_sentences
@@ -68,25 +68,24 @@ class Entry:
     at: str = ""
     always: bool = False
 
-    def make(self, result: Result) -> Item | None:
-        """The figure, a sentence in its place, or None."""
+    def make(self, result: Result, width: float = plot.WIDTH) -> Item | None:
+        """The figure, a sentence in its place, or None. width: of the figure, inches."""
         axis, how = course_axis(result) or "", CAPTIONS.get(self.name, "")
-        title = self.title.format(slow=result.counted, over=axis.replace("_", " ")).removesuffix(" (table)")
+        title = self.title.format(slow=result.counted, over=axis.replace("_", " "))
         shown = of_shown_scene(result, self.scene) if self.scene else result
         needs = (*self.needs, *(self.of if isinstance(self.of, dict) else ()))
-        drawn = result.lacks(*needs) or self._drawn(shown, plot.WIDTH)
+        drawn = result.lacks(*needs) or self._drawn(shown, width)
         if drawn is None:
             return None
         if isinstance(drawn, str):
-            return Missing(self.name, title, drawn)
+            return Missing(self.name, title, as_sentences(drawn))
         named = {"point": ("frequency", "scheme", *shown.varying, *shown.fixed), "course": (axis or "frequency",)}
         where = shown.describe(shown.shown, named.get(self.at, ()))
         title = f"{title}: {where}" if where else title
         if isinstance(drawn, Table):
             return replace(drawn, name=self.name, title=title, note=as_sentences(drawn.note, how))
         figure, *notes = drawn
-        caption = as_sentences(*notes, how)
-        return Drawing(self.name, title, caption, figure, lambda: cast("Any", self._drawn(shown, plot.COLUMN_WIDTH))[0])
+        return Drawing(self.name, title, as_sentences(*notes, how), figure)
 
     def _drawn(self, result: Result, width: float) -> Drawn:
         # the style is that of the whole process: the caller does not run with it
@@ -112,7 +111,7 @@ def _mode(draw: Callable[[Result, Any], Drawn], name: str, title: str, **options
 
 
 FIGURES = (
-    Entry("blocks", "Blocks of the mission with their wear (table)", wear.list_blocks, needs=wear.LISTED, **_BLOCK),
+    Entry("blocks", "Blocks of the mission with their wear", wear.list_blocks, needs=wear.LISTED, **_BLOCK),
     Entry("block_shares", "Wear by block over the missions", wear.draw_blocks, wear.SHARES, **_BLOCK),
     Entry("block_responses", "Vibration of each block over the missions", wear.draw_blocks, wear.RESPONSES, **_BLOCK),
     _mode(response.draw_mode, "natural_frequency", "Natural frequency of a mode over its amplitude"),
@@ -140,19 +139,22 @@ FIGURES = (
     Entry("pair_numbers", "Numbers of the contact pairs", pairs.draw_numbers, scene=OF_PAIRS, kinds=_ALL),
     Entry("natural_frequencies", "Sector and its natural frequencies, joint stuck", root.draw_sector, **_SECTOR),
     Entry("outcome_map", "How the points ended", points.draw_outcomes, always=True, kinds=_ALL),
-    Entry("certificates", "Certificates: how right the states are (table)", points.list_certificates),
+    Entry("certificates", "Certificates: how right the states are", points.list_certificates),
     Entry("precision", "Error against run time", precision.draw_precision, kinds=_OF_WEAR),
 )
 """The figures of all results."""
 
 
-def draw_report(result: Result) -> Iterator[Item]:
-    """Figures, tables, and sentences about what is missing: the results, then how far they are to be trusted."""
+def draw_report(result: Result, width: float = plot.WIDTH) -> Iterator[Item]:
+    """Figures, tables, and sentences about what is missing: the results, then how far they are to be trusted.
+
+    width: of the figures, inches.
+    """
     kind = MODES if result.has_modes else WEAR if result.blocks is None else MISSIONS
     has_results = bool(result.has_values.any())
     for entry in FIGURES:
         if kind in entry.kinds and (has_results or entry.always):
-            item = entry.make(result)
+            item = entry.make(result, width)
             if item is not None:
                 yield item
     if not has_results:

@@ -4,7 +4,7 @@ import csv
 import math
 import textwrap
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from pathlib import Path
@@ -219,27 +219,25 @@ def mark_failed(panel: Axes, positions: FloatArray, failed: NDArray[np.bool_]) -
 
 @dataclass(frozen=True)
 class Drawing:
-    """One figure. name: of its files. narrow: draws the same, `COLUMN_WIDTH` wide, with its panels below each other."""
+    """One figure. name: of its files."""
 
     name: str
     title: str
     caption: str
     figure: Figure
-    narrow: Callable[[], Figure]
 
-    def save(self, folder: Path) -> tuple[Path, Path]:
-        """Write SVG, PNG and, of lines and maps, CSV files into a folder; the SVG files of both widths."""
+    def save(self, folder: Path) -> Path:
+        """Write SVG, PNG and, of lines and maps, CSV files into a folder; the SVG file."""
         values = folder / f"{self.name}.csv"
         values.unlink(missing_ok=True)
         if rows := plotted_values(self.figure):
             with values.open("w", newline="", encoding="utf-8") as file:
                 csv.writer(file).writerows([("panel", "series", "x", "x value", "y", "y value", "value"), *rows])
-        with style():
-            wide, narrow = _save(self.figure, folder / self.name), self.narrow()
-            fit_into_column(narrow)
-            # names of any length may leave its panels no room
-            with warnings.catch_warnings(action="ignore", category=UserWarning):
-                return wide, _save(narrow, folder / f"{self.name}_column")
+        # names of any length may leave the panels of a column no room
+        with style(), warnings.catch_warnings(action="ignore", category=UserWarning):
+            if self.figure.get_figwidth() < _WIDE:
+                fit_into_column(self.figure)
+            return _save(self.figure, folder / self.name)
 
 
 @dataclass(frozen=True)

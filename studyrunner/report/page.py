@@ -60,16 +60,16 @@ def write_page(result: Result, items: Iterable[Item], path: Path) -> str:
 
 
 def _save(drawing: Drawing, folder: Path) -> dict[str, Any]:
-    """A drawing as it stands on the page: pictures for wide and narrow windows, and names of its files.
+    """A drawing as it stands on the page: its picture, and names of its files.
 
     Parts of SVG files with one id are equal: matplotlib makes the ids of what is referred to from their contents.
     """
-    paths = drawing.save(folder)
-    wide, narrow = (text[text.index("<svg") :] for text in (path.read_text(encoding="utf-8") for path in paths))
-    files = [f"{drawing.name}.{kind}" for kind in ("svg", "png", "csv")] + [paths[1].name]
-    there = [name for name in files if (folder / name).exists()]
+    text = drawing.save(folder).read_text(encoding="utf-8")
+    files = [name for kind in ("svg", "png", "csv") if (folder / (name := f"{drawing.name}.{kind}")).exists()]
     about = {"name": drawing.name, "title": drawing.title, "caption": drawing.caption}
-    return {**about, "wide": wide, "narrow": narrow, "files": there}
+    # pixels on a wide screen: half as large again as in print
+    about["width"] = f"{1.5 * 96.0 * drawing.figure.get_figwidth():.0f}"
+    return {**about, "picture": text[text.index("<svg") :], "files": files}
 
 
 def _build_page(result: Result, parts: Sequence[Any]) -> str:

@@ -51,7 +51,7 @@ _WHOLE = np.array([0.35, -0.6, -0.72])  # to the eye, where upwards is x
 _ASLANT, _FROM_ABOVE = 0.55, 0.3
 # colours of the bodies in their order: their lightness differs, in print as well
 _BODIES, _NAMED = ("#d9b38c", "#9ecae1", "#c7c7c7", "#b5d99c"), {"blade": "#9ecae1", "disk": "#d9b38c"}
-_INSIDE, _EDGEWAYS = 0.42, 1e-9
+_INSIDE, _EDGES, _EDGEWAYS = 0.42, 0.25, 1e-9
 
 
 @dataclass(frozen=True)
@@ -144,9 +144,8 @@ def read_mesh(result: Result) -> tuple[Floats, Places, NDArray[np.str_]]:
     return nodes, faces, parts
 
 
-def face_normals(nodes: Floats, faces: Places) -> Floats:
-    """Outward normals (n_faces, 3) of the length of the area of the faces (n_faces, 4), m2."""
-    corners = nodes[faces]
+def face_normals(corners: Floats) -> Floats:
+    """Outward normals (n_faces, 3) of the length of the area, m2, of faces of these corners (n_faces, 4, 3), m."""
     return np.asarray(0.5 * np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 1]))
 
 
@@ -159,7 +158,7 @@ def _find_contact_faces(
     of_faces = np.where(stands[faces].all(axis=1), flank[nearest[faces[:, 0]]], -1)
     of_faces[(flank[nearest[faces]] != of_faces[:, None]).any(axis=1)] = -1
     touching, normals = faces[of_faces >= 0], np.zeros_like(nodes)
-    np.add.at(normals, touching, face_normals(nodes, touching)[:, None, :])
+    np.add.at(normals, touching, face_normals(nodes[touching])[:, None, :])
     used = np.unique(touching)
     normals = normals[used] / np.maximum(np.linalg.norm(normals[used], axis=1, keepdims=True), 1e-300)
     return of_faces, used, nearest[used], normals
@@ -212,7 +211,7 @@ def _close_up(surface: RootSurface, body: int, flank: int, up: Floats) -> View:
     of_body = surface.body == body
     inside = surface.nodes[np.unique(surface.faces[of_body & (surface.flank >= 0)])]
     looked_at = of_body & (surface.flank == flank)
-    normal = face_normals(surface.nodes, surface.faces[looked_at]).sum(axis=0)
+    normal = face_normals(surface.nodes[surface.faces[looked_at]]).sum(axis=0)
     normal /= max(float(np.linalg.norm(normal)), 1e-300)
     size = float(np.linalg.norm(np.ptp(inside, axis=0)))
     low, high = inside.min(axis=0) - _AROUND * size, inside.max(axis=0) + _AROUND * size
@@ -252,20 +251,23 @@ def rgb(names: tuple[str, ...], which: Places) -> Floats:
     return np.array([to_rgb(colour) for colour in body_colours(names)])[which]
 
 
-def paint_faces(panel: Axes, nodes: Floats, faces: Places, colours: Floats, view: View) -> None:
-    """Faces (n, 4) with colours (n, 3) as seen in a view, in mm; inner sides, where a mesh is cut, are grey."""
-    order = np.argsort(nodes[faces].mean(axis=1) @ view.to_eye, kind="stable")
-    normals = face_normals(nodes, faces)
+def paint_faces(
+    panel: Axes, corners: Floats, colours: Floats, view: View, whole: Floats | None = None, n_plain: int = 0
+) -> None:
+    """Faces (n, 4, 3), m, with colours (n, 3) as seen in a view, in mm; inner sides, where a mesh is cut, are grey.
+
+    n_plain: of the last ones, whose colours are values: they have no shade and no edges. whole (n, 3): middles of the
+    faces, or of those that they are pieces of.
+    """
+    order = np.argsort((corners.mean(axis=1) if whole is None else whole) @ view.to_eye, kind="stable")
+    normals = face_normals(corners)
     turned = normals @ view.to_eye / np.maximum(np.linalg.norm(normals, axis=1), 1e-300)
-    lit = np.where((turned < -_EDGEWAYS)[:, None], _INSIDE, colours * (0.55 + 0.45 * np.abs(turned))[:, None])
-    painted = PolyCollection(
-        list(view.seen(nodes)[faces[order]]),
-        facecolors=lit[order],
-        edgecolors="0.25",
-        linewidths=0.2,
-        rasterized=True,
-    )
-    panel.add_collection(painted)
+    plain = np.arange(len(corners)) >= len(corners) - n_plain
+    shade = np.where(plain, 1.0, 0.55 + 0.45 * np.abs(turned))
+    lit = np.where((turned < -_EDGEWAYS)[:, None], _INSIDE, colours * shade[:, None])
+    edges = np.where(plain[:, None], lit, _EDGES)
+    look: dict[str, Any] = {"facecolors": lit[order], "edgecolors": edges[order], "linewidths": 0.2}
+    panel.add_collection(PolyCollection(list(view.seen(corners[order])), rasterized=True, **look))
     panel.set_aspect("equal")
     panel.autoscale_view()
     panel.grid(visible=False)

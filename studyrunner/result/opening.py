@@ -142,11 +142,12 @@ def reading_errors(source: str, *, every: bool = False) -> Iterator[None]:
         raise
 
 
-def describe_outcome(number: int) -> tuple[str, str]:
-    """Word and sentence of an outcome; the number, where it is one of a later version."""
+def describe_outcome(number: int) -> tuple[str, str, str]:
+    """Word and sentence of an outcome, and what has happened; the number, where it is one of a later version."""
     if number not in list(Outcome):
-        return f"outcome_{number}", f"outcome {number}"
-    return Outcome(number).meaning, Outcome(number).sentence
+        return f"outcome_{number}", f"outcome {number}", f"outcome {number}"
+    outcome = Outcome(number)
+    return outcome.meaning, outcome.sentence, outcome.happened
 
 
 def outcome_words(outcome: xr.DataArray) -> xr.DataArray:

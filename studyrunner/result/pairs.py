@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy  # whose parts are loaded at their first use
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from studyrunner.coordinates import COORDINATES, SCENE
 from studyrunner.result.view import Point, Result
@@ -174,7 +174,7 @@ def find_grid(position: Floats) -> Grid:
         raise ValueError("the positions of its contact pairs are not known.")
     if len(position) == 1:
         return Grid(np.zeros((1, 1), dtype=np.intp), np.zeros(1), np.zeros(1))
-    spacing = cKDTree(position).query(position, k=2)[0][:, 1].min()
+    spacing = scipy.spatial.cKDTree(position).query(position, k=2)[0][:, 1].min()
     if spacing <= 1e-9 * np.ptp(position, axis=0).max():
         raise ValueError("two of its contact pairs are in one place.")
     away = position - position[0]
@@ -223,7 +223,7 @@ def _parallel_lines(position: Floats, direction: Floats, tolerance: float) -> Pl
     alike = np.sum(np.linalg.norm(across[None] - some[:, None], axis=2) <= tolerance, axis=1)
     if len(across) % alike[0] or np.any(alike != alike[0]):
         return None
-    tree = cKDTree(across)
+    tree = scipy.spatial.cKDTree(across)
     first = np.array([min(near) for near in tree.query_ball_point(tree.data, tolerance)])
     counts = np.unique(first, return_counts=True)[1]
     if np.any(counts != counts[0]):

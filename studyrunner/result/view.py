@@ -109,10 +109,10 @@ class Result:
         return all(name in self.dataset.variables for name in names)
 
     def lacks(self, *names: str) -> str:
-        """Sentence that says which of these variables to ask for; empty where the file has all."""
+        """Which of these variables to ask for, without a full stop; empty where the file has all."""
         there = {*self.dataset.variables, *(self.blocks or ())}
         missing = [name for name in names if name not in there]
-        return f"Add {' and '.join(missing)} to [outputs] variables." if missing else ""
+        return f"Add {' and '.join(missing)} to [outputs] variables" if missing else ""
 
     def at(self, name: str, point: Point, cycle: int | slice | list[int] = slice(None)) -> xr.DataArray:
         """A variable of one point, read for this point only. cycle: index, or indices, along `cycle` if it has that."""

@@ -13,8 +13,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy  # whose parts are loaded at their first use
 from numpy.typing import NDArray
-from scipy.stats import beta, binom, norm, rankdata, sobol_indices
 
 Array = NDArray[np.float64]
 SAMPLE, CYCLE = "sample", "cycle"
@@ -80,7 +80,7 @@ def band_of(estimate: Estimate, values: SampleValues, inputs: Array | None = Non
     cases = [values.low] if known.all() else [values.low, values.high]
     if not known.all() and inputs is not None:
         typical = np.where(known | ~known.any(axis=-1, keepdims=True), 0.5 * (values.low + values.high), np.nan)
-        place = (rankdata(inputs, axis=0) - 0.5).T / len(inputs)
+        place = (scipy.stats.rankdata(inputs, axis=0) - 0.5).T / len(inputs)
         for order in (*place, *(1.0 - place)):
             ordered = np.moveaxis(np.nanquantile(typical, order, axis=-1), 0, -1)
             cases.append(np.clip(ordered, values.low, values.high))
@@ -99,7 +99,7 @@ def quantiles(values: SampleValues, probabilities: Sequence[float], confidence: 
     n, p, tail = values.low.shape[-1], np.array(probabilities), 0.5 * (1.0 - confidence)
     rank = np.maximum(np.ceil(n * p - _ROUND_OFF).astype(int), 1)
     # P(at most first - 1 samples lie below the quantile) <= tail, P(last samples or more do) <= tail
-    first, last = binom.ppf(tail, n, p).astype(int), binom.ppf(1.0 - tail, n, p).astype(int) + 1
+    first, last = scipy.stats.binom.ppf(tail, n, p).astype(int), scipy.stats.binom.ppf(1.0 - tail, n, p).astype(int) + 1
 
     def estimate(y: Array) -> tuple[Array, Array, Array]:
         ordered = np.sort(y, axis=-1)
@@ -115,8 +115,8 @@ def exceedance(values: SampleValues, thresholds: Array, confidence: float) -> tu
 
     def estimate(y: Array) -> tuple[Array, Array, Array]:
         above = np.stack([(y > each).sum(axis=-1) for each in thresholds], axis=-1).astype(np.float64)
-        low = np.where(above > 0, beta.ppf(tail, np.maximum(above, 1), n - above + 1), 0.0)
-        high = np.where(above < n, beta.ppf(1.0 - tail, above + 1, np.maximum(n - above, 1)), 1.0)
+        low = np.where(above > 0, scipy.stats.beta.ppf(tail, np.maximum(above, 1), n - above + 1), 0.0)
+        high = np.where(above < n, scipy.stats.beta.ppf(1.0 - tail, above + 1, np.maximum(n - above, 1)), 1.0)
         return above / n, low, high
 
     return band_of(estimate, values)
@@ -129,13 +129,13 @@ def rank_correlations(inputs: Array, values: SampleValues, confidence: float) ->
     n = len(inputs)
 
     def scores(y: Array) -> Array:
-        ranks = rankdata(y, axis=-1) - 0.5 * (n + 1)
+        ranks = scipy.stats.rankdata(y, axis=-1) - 0.5 * (n + 1)
         length = np.linalg.norm(ranks, axis=-1, keepdims=True)
         return np.asarray(ranks / np.where(length > 0.0, length, 1.0))
 
     def estimate(y: Array) -> tuple[Array, Array, Array]:
         found = np.clip(scores(y) @ scores(inputs.T).T, -1.0, 1.0)
-        margin = norm.ppf(0.5 + 0.5 * confidence) * np.sqrt((1.0 + 0.5 * found**2) / (n - 3.0))
+        margin = scipy.stats.norm.ppf(0.5 + 0.5 * confidence) * np.sqrt((1.0 + 0.5 * found**2) / (n - 3.0))
         # that of 1 is infinite: the largest of other ranks, with two neighbours exchanged
         most = 1.0 - 12.0 / (n**3 - n)
         middle = np.arctanh(np.clip(found, -most, most))
@@ -165,13 +165,13 @@ def saltelli_indices(inputs: Array, values: SampleValues, confidence: float) -> 
         # scipy takes off dimensions of length 1: there are at least two points
         rows = np.vstack([y, y[:1]]).reshape(len(y) + 1, -1, 2 + d)
         parts = {"f_A": rows[..., 0], "f_B": rows[..., 1], "f_AB": np.moveaxis(rows[..., 2:], -1, 0)}
-        found = sobol_indices(func=parts, n=n_base)
+        found = scipy.stats.sobol_indices(func=parts, n=n_base)
         return np.concatenate([each.reshape(len(y) + 1, d)[:-1] for each in (found.first_order, found.total_order)], 1)
 
     def estimate(y: Array) -> tuple[Array, Array, Array]:
         points = y.reshape(-1, y.shape[-1])
         found, spread = both(points), np.std([both(points[:, rows]) for rows in resampled], axis=0)
-        margin = norm.ppf(0.5 + 0.5 * confidence) * spread
+        margin = scipy.stats.norm.ppf(0.5 + 0.5 * confidence) * spread
         ends = np.clip([found, found - margin, found + margin], 0.0, 1.0)
         return _where_varying(y, *ends.reshape(3, *y.shape[:-1], 2 * d))
 
@@ -251,7 +251,7 @@ def density(values: SampleValues, groups: Groups | None, grid: Array) -> Array:
         if len(sample):
             # equal samples: as narrow a peak as the grid shows
             width = max(1.06 * sample.std() * len(sample) ** -0.2, 0.5 * float(np.ptp(grid)) / len(grid)) or np.nan
-            whole += norm.pdf(grid[:, None], sample, width).sum(axis=1) / known.sum()
+            whole += scipy.stats.norm.pdf(grid[:, None], sample, width).sum(axis=1) / known.sum()
     return whole
 
 

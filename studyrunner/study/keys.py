@@ -6,6 +6,7 @@ from typing import Literal, get_args, get_origin
 
 import numpy as np
 
+from studies.scene import describe_field
 from studyrunner.study.mistakes import check_tables, keys_as_given, scene_errors
 from studyrunner.study.scene_section import SceneSection
 from studyrunner.study.sections import SECTIONS, MissionBlock, StudySection
@@ -137,7 +138,8 @@ def _keys(table: str, kind: type[Section]) -> Iterator[tuple[str, str, str]]:
             words = f"a number, or {words}"
         if field.description:
             default = "" if value is None else toml_value(value)
-            yield key, default, f"{words}: {field.description}" if words else field.description
+            meaning = describe_field(field)
+            yield key, default, f"{words}: {meaning}" if words else meaning
 
 
 def _types_and_words(annotation: object) -> Iterator[object]:

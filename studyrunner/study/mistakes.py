@@ -1,7 +1,6 @@
 """What is wrong with the tables of a study: one sentence for each key that pydantic or a rule between keys refuses."""
 
 import difflib
-import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -10,6 +9,7 @@ from typing import Any, get_args
 
 from pydantic import BaseModel, ValidationError
 
+from studies.scene import describe_field
 from studies.scene_error import SceneError, remedy_of
 from studyrunner.user_error import UserError, Verbatim
 from studyrunner.values import Section, Wrong
@@ -129,11 +129,11 @@ def _locate(details: dict[str, Any], kind: type[BaseModel], table: object) -> _M
             extra = [each.EXTRA for each in tables if issubclass(each, Section) and each.EXTRA and not fields]
             tables = [found for field in fields for found in tables_in(field.annotation)] + [each for each, _ in extra]
             # a key without a description of its own is part of one with a description
-            meanings = (*(field.description for field in fields), *(f"as {looks}" for _, looks in extra))
+            meanings = (*map(describe_field, fields), *(f"as {looks}" for _, looks in extra))
             meaning = next(filter(None, meanings), meaning)
         elif isinstance(inner, list | tuple) and isinstance(part, int) and part < len(inner):
             inner = inner[part]
-    return _Mistake(details, tuple(names), around, f" ({re.sub(', [-1]$', '', meaning)})" if meaning else "")
+    return _Mistake(details, tuple(names), around, f" ({meaning})" if meaning else "")
 
 
 def _wrong(key: str, found: Sequence[_Mistake], elsewhere: Mapping[str, str]) -> Wrong:

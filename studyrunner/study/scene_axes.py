@@ -2,13 +2,13 @@
 
 import itertools
 import math
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Annotated, Any
 
 from pydantic import BaseModel, BeforeValidator, RootModel
 
+from studies.scene import Unit, said_of
 from studyrunner.study.mistakes import check_tables, raise_wrong, tables_in
 from studyrunner.study.sections import SOLVER_AXES, AxesSection, WearSection
 from studyrunner.user_error import UserError
@@ -18,8 +18,6 @@ Tables = dict[str, Any]
 AxisValue = float | int | bool | str
 
 _MOST_VARIANTS = 10_000  # each of them is checked, which takes 0.2 ms
-_UNITS = {"-": "1", "1": "1", "degrees": "degree", "rpm": "rpm"}
-_UNITS |= {name: name for name in ("Hz", "N", "m", "m2", "Pa", "1/Pa", "N/m", "N/m3", "N s/m", "kg", "kg/m3", "J/m2")}
 
 
 @dataclass(frozen=True)
@@ -27,7 +25,7 @@ class SceneAxis:
     """An axis of a study whose values belong to a key of [scene] or [wear].
 
     name: of the dimension. table, key: the key; a second name in `key` is that of a surface or of a key in a table.
-    values: in the order of the study file. units, meaning: as in the description of the key.
+    values: in the order of the study file. units, meaning: of the key.
     """
 
     name: str
@@ -129,17 +127,11 @@ def is_table(value: object) -> bool:
 
 
 def describe_key(kind: type[BaseModel], name: str, inner: str = "") -> tuple[str, str]:
-    """Unit and meaning in the description of a key: parts between commas, of which one is the unit.
-
-    inner: key in the table that the key holds, or a surface.
-    """
+    """Unit and meaning of a key. inner: key in the table that the key holds, or a surface."""
     field = kind.model_fields[name]
     for table in tables_in(field.annotation):
         if inner in table.model_fields:
             units, _ = describe_key(table, inner)
             return units, f"{inner.replace('_', ' ')} of {name.replace('_', ' ')}"
-    text = field.description or ""
-    units = next((part for part in reversed(re.split("[,;] ", text)) if part in _UNITS), "1")
-    parts = [part for part in text.partition("; ")[0].split(", ") if part != units]
-    meaning = ", ".join(parts) or name.replace("_", " ")
-    return _UNITS[units], f"{meaning}, {inner}" if inner else meaning
+    meaning = field.description or name.replace("_", " ")
+    return said_of(field, Unit) or "1", f"{meaning}, {inner}" if inner else meaning

@@ -8,6 +8,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from solver.contact.wear_law import WearLaw, WearTable
 from solver.settings import TARGETS, Followed, Passage
+from studies.scene import Unit
 from studyrunner.coordinates import SCENE
 from studyrunner.scatter import ScatterSection
 from studyrunner.study.mistakes import check_tables, nearest_name, raise_wrong
@@ -107,8 +108,8 @@ class WearSection(Section):
     """Keys of the laws that take any, beside `surfaces`, which all take."""
 
     law: Literal["archard", "energy", "threshold", "table"] = Field("archard", description="what wears")
-    threshold: NotNegative | None = Field(
-        None, description="J/m2, slip work per area in a cycle below which nothing wears"
+    threshold: Annotated[NotNegative | None, Unit("J/m2")] = Field(
+        None, description="slip work per area in a cycle below which nothing wears"
     )
     pressure: _Knots | None = Field(None, description="Pa, ascending: mean over a period, of the rows of factor")
     depth: _Knots | None = Field(None, description="m, ascending: worn depth, of the columns of factor")

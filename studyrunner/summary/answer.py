@@ -1,7 +1,6 @@
 """The summary of a result: for the command, the page and notebooks; as data, and in at most nine lines."""
 
 import math
-import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -104,7 +103,7 @@ def _failures(result: Result) -> Iterator[Finding]:
     for number, n_points in zip(numbers.tolist(), counts.tolist(), strict=True):
         if number == Outcome.CONVERGED:
             continue
-        word, sentence = describe_outcome(number)
+        word, _, happened = describe_outcome(number)
         place = tuple(np.argwhere(result.dataset["outcome"].values == number)[0].tolist())
         # the volumes in the message of a point whose error is known are no results
         is_silent = not result.has("message") or (number == Outcome.SENSITIVE and np.isfinite(result.errors[place]))
@@ -113,12 +112,11 @@ def _failures(result: Result) -> Iterator[Finding]:
         advice, first = ADVICE.get(number, ""), reason[:1].upper() + reason[1:]
         if result.varying:
             first = f"First: {': '.join(filter(None, (where_is(result, result.point_at(place)), reason)))}"
-        sentences = (re.split(r"[.:](?:\s|$)", sentence)[0] or word, advice, first)
         of = f"{n_points} of {count(result.computed.size, 'point')}: " if result.computed.size > 1 else ""
         is_complete = number in COMPLETE
         values = {"n_points": n_points, "is_complete": is_complete, "reason": reason, "advice": advice}
         label = "uncertain" if is_complete else "failed"
-        findings.append(Finding(word, label, of + ". ".join(filter(None, sentences)), values))
+        findings.append(Finding(word, label, of + ". ".join(filter(None, (happened, advice, first))), values))
     findings.sort(key=lambda each: (each.values["is_complete"], -each.values["n_points"]))
     yield from findings[:_MOST_FAILURES]
     if left := findings[_MOST_FAILURES:]:

@@ -55,7 +55,7 @@ def shrink(png: bytes, width: int | None = None) -> bytes:
 def write_picture(drawing: Drawing) -> str:
     """Writes the figure as a PNG file of `WIDTH` pixels; its SHA-256."""
     with tempfile.TemporaryDirectory() as large:
-        png = shrink(drawing.save(Path(large))[0].with_suffix(".png").read_bytes(), WIDTH)
+        png = shrink(drawing.save(Path(large)).with_suffix(".png").read_bytes(), WIDTH)
     (FOLDER / f"{drawing.name}.png").write_bytes(png)
     return hashlib.sha256(png).hexdigest()
 

@@ -139,7 +139,7 @@ def scaled(case, matrix, factor):
 
 
 def extreme_cases():
-    """Name, case, and the outcomes that its history may have; None where also its first state may be missing."""
+    """Name, case, and the outcomes that its first state and its history may have."""
     for name, base in BASES.items():
         for friction, other in ((0.0, 0.05), (2.0, 2.0)) if name != "slider" else ():
             yield f"{name}, friction {friction}", replace(base, friction=friction), COMPLETE
@@ -150,13 +150,16 @@ def extreme_cases():
             yield f"{name}, {times} times the load", replace(base, amplitude=times * base.amplitude), COMPLETE
     held = 2.0 * np.pi * glued_frequency(elastic().model)
     free = scaled(elastic(), "damping", 0.0)
-    yield "no damping, at a resonance of the held structure", replace(free, omega=held), None
-    # lightly damped on stiff ground: there is a state, whatever its history
-    yield "a block that bounces", block(lift=0.2), (*Outcome,)
+    yield (
+        "no damping, at a resonance of the held structure",
+        replace(free, omega=held),
+        (*COMPLETE, Outcome.BRANCH_LOST),
+    )
+    yield "a block that bounces", block(lift=0.2), COMPLETE
     yield "no damping, elastic", free, COMPLETE
     yield "no damping, block", scaled(block(), "damping", 0.0), COMPLETE
     # no load but a vibrating one on pairs that just touch: predicted forces whose squares underflow
-    yield "1e-160 N", replace(block(preload=0.0, lift=0.2), amplitude=1e-160), None
+    yield "1e-160 N", replace(block(preload=0.0, lift=0.2), amplitude=1e-160), (Outcome.CERTIFICATE_FAILED,)
 
 
 EXTREMES = {name: (case, outcomes) for name, case, outcomes in extreme_cases()}
@@ -166,9 +169,7 @@ EXTREMES = {name: (case, outcomes) for name, case, outcomes in extreme_cases()}
 @pytest.mark.parametrize("name", EXTREMES)
 def test_extreme_cases_end_honestly(name):
     case, outcomes = EXTREMES[name]
-    start, history = run(case)
-    assert outcomes is None or start.outcome is Outcome.CONVERGED, start.outcome.sentence
-    assert outcomes is None or history.outcome in outcomes, history.outcome.sentence
+    assert {each.outcome for each in run(case)} <= set(outcomes)
 
 
 @pytest.mark.slow

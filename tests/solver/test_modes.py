@@ -196,7 +196,7 @@ def test_what_has_no_mode_says_so():
 @pytest.mark.slow
 def test_the_dovetail_softens_and_damps_and_its_forced_resonance_agrees():
     model = dovetail(21)
-    amplitudes = np.array([1e-6, 7e-4, 1e-3])
+    amplitudes = np.array([1e-6, 7e-4])
     found = backbone(model, amplitudes, 0.5)
     assert set(found.outcome) == {Outcome.CONVERGED}
     assert found.frequency[0] == pytest.approx(212.856, abs=1e-3)

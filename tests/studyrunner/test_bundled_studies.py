@@ -20,11 +20,11 @@ pytestmark = [pytest.mark.usefixtures("folder"), pytest.mark.slow]
 
 SMALL = {
     "cylinder_on_flat": "scene.strips=24 solver.harmonics=3 solver.samples=64",
-    "sphere_on_flat": "scene.patches=5 solver.harmonics=3 solver.samples=64",
+    "sphere_on_flat": "scene.patches=4 slow_time.cycles=1e4 slow_time.outputs=3 solver.harmonics=3 solver.samples=64",
     "damper": "axes.nodal_diameter=8 slow_time.cycles=10000 slow_time.outputs=3",
     "dovetail": "scene.mesh=1 axes.frequency=[207.0,212.5] slow_time.cycles=3000 slow_time.outputs=4"
     " solver.harmonics=3 solver.samples=64",
-    "extremes": "axes.frequency=212.86 axes.wear_coefficient=[1.1e-14,1.1e-7] axes.step=1000 slow_time.cycles=20"
+    "extremes": "axes.frequency=212.86 axes.wear_coefficient=[1.1e-14,1.1e-6] axes.step=1000 slow_time.cycles=20"
     " slow_time.outputs=3 solver.harmonics=3 solver.samples=64",
     "mission": "slow_time.missions=1 slow_time.outputs=2 solver.harmonics=3 solver.samples=64",
     "modes": "axes.modal_amplitude=[1e-4,2e-4]",

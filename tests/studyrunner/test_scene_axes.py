@@ -7,13 +7,16 @@ import numpy as np
 import pytest
 import xarray as xr
 
+from studies.fe_models.from_files.parameters import Parameters
 from studies.finite_element import reduction
 from studies.finite_element.elimination import NotPositiveDefiniteError, factorise
+from studies.scenes import scene_parameters
 from studyrunner import compute_worn_joint
 from studyrunner.cli import main
 from studyrunner.result.opening import open_known
 from studyrunner.scene.answers import exact_answers
 from studyrunner.scene.scene_set import find_scenes
+from studyrunner.study.scene_axes import describe_key
 from studyrunner.study.study_file import read_study
 from tests.mpi.launching import options, results
 from tests.studyrunner.fakes import plan_of
@@ -22,6 +25,13 @@ from tests.studyrunner.small_studies import CHEAP, UNWORN, compute, same_values,
 pytestmark = pytest.mark.usefixtures("folder")
 THREE = ("slow_time.outputs=3", "axes.scheme=adaptive")
 EXACT = "outputs.variables=['default', 'exact']"
+
+
+def test_the_unit_of_an_axis_is_metadata_of_its_key():
+    shown = {"stroke": "m", "E": "Pa", "nu": "1"}
+    assert {name: describe_key(scene_parameters("sphere_on_flat"), name)[0] for name in shown} == shown
+    assert describe_key(Parameters, "rotation_speed") == ("rpm", "rotation speed")
+    assert describe_key(Parameters, "preload", "force") == ("N", "force of preload")
 
 
 @pytest.mark.slow

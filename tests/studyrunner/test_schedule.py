@@ -159,6 +159,14 @@ def tasks_of():
     return plan_of(read_study("sdof_slider", [f"axes.{each}" for each in (*axes, "sweep=['up', 'down']")]), 2)
 
 
+def swept(progress, plan):
+    """The histories that begin once all start states are there, which took as long as was planned."""
+    for sweep in plan.sweeps:
+        for start, seconds in zip(fake_sweep(sweep), sweep.costs, strict=True):
+            progress.costs.learn(sweep.cost_keys, seconds, seconds)
+            yield from progress.take(sweep, start)
+
+
 def test_the_seconds_left_fall_to_none_and_follow_what_was_measured():
     plan = tasks_of()
     progress = StudyRun(MemoryIndex(plan), None, None, 2)
@@ -166,15 +174,14 @@ def test_the_seconds_left_fall_to_none_and_follow_what_was_measured():
     # one rank waits for a start state
     running = [(progress.tasks[0], plan.sweeps[0].n_results, 0.0)]
     assert progress.look(running).seconds_left == pytest.approx(planned / 2)
-    histories = []
     for sweep in plan.sweeps:
-        for start, seconds in zip(fake_sweep(sweep), sweep.costs, strict=True):
-            # the first one is dearer, as was planned, and says nothing of the others
-            assert sum(sweep.costs) == pytest.approx(sweep.cost)
-            assert sweep.costs[0] > 5.0 * sweep.costs[1]
-            progress.costs.learn(sweep.cost_keys, seconds, seconds)
-            histories.extend(progress.take(sweep, start))
-            assert progress.look(()).seconds_left <= planned / 2
+        # the first one is dearer, as was planned, and says nothing of the others
+        assert sum(sweep.costs) == pytest.approx(sweep.cost)
+        assert sweep.costs[0] > 5.0 * sweep.costs[1]
+    histories = []
+    for history in swept(progress, plan):
+        histories.append(history)
+        assert progress.look(()).seconds_left <= planned / 2
     for number, task in enumerate(histories, start=1):
         progress.costs.learn(task.cost_keys, task.cost, 2.0 * task.cost)
         progress.take(task, fake_history(task))
@@ -188,11 +195,8 @@ def test_the_seconds_left_fall_to_none_and_follow_what_was_measured():
 def test_a_few_cheap_results_do_not_shorten_the_time_left():
     """Far from the resonance nothing slips: of the bundled study 20 s were said to be left at 9 s of 66 s."""
     plan = tasks_of()
-    progress, histories = StudyRun(MemoryIndex(plan), None, None, 2), []
-    for sweep in plan.sweeps:
-        for start, seconds in zip(fake_sweep(sweep), sweep.costs, strict=True):
-            progress.costs.learn(sweep.cost_keys, seconds, seconds)
-            histories.extend(progress.take(sweep, start))
+    progress = StudyRun(MemoryIndex(plan), None, None, 2)
+    histories = [*swept(progress, plan)]
     for task in histories[:2]:
         progress.costs.learn(task.cost_keys, task.cost, 0.05 * task.cost)
         progress.take(task, fake_history(task))

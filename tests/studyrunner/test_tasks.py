@@ -205,7 +205,9 @@ def test_what_was_computed_of_a_point_that_failed_is_kept():
     assert result.values["worn_volume"][:2].tolist() == [0.0, 1.0]
     assert result.values["largest_wear_depth"] == 1.0
     assert totals_of(result, "branch", "fold_frequency", "newton_iterations") == [2, 101.5, 7]
-    assert result.values["message"] == "lost; computed up to cycle 50 of 20 000, the worn volume there to 3 %"
+    message = result.values["message"]
+    assert message.startswith("lost; ")
+    assert all(words in message for words in ("cycle 50 of 20 000", "3 %"))
 
 
 def test_loops_are_read_at_the_counts_of_a_point():

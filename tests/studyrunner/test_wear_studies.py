@@ -208,7 +208,8 @@ def test_every_point_without_a_resonance_says_why(capsys):
     said = capsys.readouterr().out
     with open_result("out.nc") as result:
         messages = {str(message) for message in result.message.values.ravel()}
-    assert messages == {"the sweep up meets no resonance between 180 and 230 Hz: give another range"}
+    (message,) = messages
+    assert "between 180 and 230 Hz" in message
     assert "another axes.sweep" in said
     assert "ramp" not in said
     assert "205 Hz" not in said

@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 
-from studies.scene import ContactStiffness
+from studies.scene import ContactStiffness, Density, Metre, Newton, NewtonPerMetre, Pascal, Remark, Rpm, Unit
 
 
 def _as_tuple(value: object) -> object:
@@ -42,33 +42,33 @@ class SetDirection(Table):
 class Preload(SetDirection):
     """A constant force on a set of nodes, shared evenly."""
 
-    force: float = Field(description="N")
+    force: Newton
 
 
 class AxisTable(Table):
     """The axis of rotation, and of a cyclic structure."""
 
-    point: Vector = Field((0.0, 0.0, 0.0), description="on the axis, m")
+    point: Annotated[Vector, Unit("m")] = Field((0.0, 0.0, 0.0), description="on the axis")
     direction: Direction = Field(description="three numbers, of any length")
 
 
 class MaterialTable(Table):
     """An isotropic elastic material."""
 
-    young_modulus: float = Field(gt=0, description="Pa")
-    poisson_ratio: float = Field(ge=0, lt=0.5, description="-")
-    density: float = Field(gt=0, description="kg/m3")
+    young_modulus: Pascal = Field(gt=0)
+    poisson_ratio: float = Field(ge=0, lt=0.5)
+    density: Density = Field(gt=0)
 
 
 class Parameters(Table):
     """[scene] of a finite-element model. What is not given comes from the deck."""
 
-    friction_coefficient: float | dict[str, float] | None = Field(
-        None, description="Coulomb's, of all pairs or by the name of a surface of each contact; default: the deck's, -"
+    friction_coefficient: Annotated[float | dict[str, float] | None, Remark("default: the deck's")] = Field(
+        None, description="Coulomb's, of all pairs or by the name of a surface of each contact"
     )
     contact_stiffness: ContactStiffness = None
-    matrices: str | None = Field(
-        None, description="name that the files with the matrices have in common; without it they are assembled here"
+    matrices: Annotated[str | None, Remark("without it they are assembled here")] = Field(
+        None, description="name that the files with the matrices have in common"
     )
     units: Literal["SI", "mm-t-s"] = Field(description='of the files, "SI" or "mm-t-s"')
     contact: Pairs | None = Field(
@@ -94,17 +94,15 @@ class Parameters(Table):
         description="constant forces beside the centrifugal one, no part of the prestress: [{set, direction, force}];"
         " default: CLOAD and pressures of the deck's static steps",
     )
-    nodal_diameter: int = Field(0, ge=0, description="nodal diameter of the travelling wave that excites, -")
-    loss_factor: float = Field(1e-3, ge=0, description="loss factor of the material, exact at the first frequency, -")
-    stuck_modes: int = Field(20, ge=1, le=200, description="modes of the glued structure kept in the reduction, -")
-    retention_stiffness: float = Field(
-        0.0, ge=0, description="stiffness of the retainer on the mean relative displacement of all pairs, N/m"
+    nodal_diameter: int = Field(0, ge=0, description="nodal diameter of the travelling wave that excites")
+    loss_factor: float = Field(1e-3, ge=0, description="loss factor of the material, exact at the first frequency")
+    stuck_modes: int = Field(20, ge=1, le=200, description="modes of the glued structure kept in the reduction")
+    retention_stiffness: NewtonPerMetre = Field(
+        0.0, ge=0, description="stiffness of the retainer on the mean relative displacement of all pairs"
     )
     retention_direction: Direction | None = Field(None, description="of the retainer; default: that of the axis")
-    tolerance: float | None = Field(
-        None,
-        gt=0,
-        description="largest distance of a node that is paired, m; default: that of the TIE, or 5 % of a facet",
+    tolerance: Annotated[Metre | None, Remark("default: that of the TIE, or 5 % of a facet")] = Field(
+        None, gt=0, description="largest distance of a node that is paired"
     )
     gaps: bool = Field(False, description="whether distances of the surfaces in the mesh are gaps of the joint")
     clamp: Names | None = Field(
@@ -113,10 +111,12 @@ class Parameters(Table):
     material: MaterialTable | dict[str, MaterialTable] | None = Field(
         None, description="of all elements, or by the name of a set of elements"
     )
-    rotation_speed: float | None = Field(None, ge=0, description="rpm; default: that of the deck's CENTRIF")
-    stress_stiffening: bool = Field(True, description="stress stiffening and spin softening by the rotation, -")
+    rotation_speed: Annotated[Rpm | None, Remark("default: that of the deck's CENTRIF")] = Field(None, ge=0)
+    stress_stiffening: bool = Field(True, description="stress stiffening and spin softening by the rotation")
     axis: AxisTable | None = Field(None, description="{point, direction}; default: the deck's")
-    n_sectors: int | None = Field(None, ge=2, description="sectors of the whole; default: the deck's, -")
+    n_sectors: Annotated[int | None, Remark("default: the deck's")] = Field(
+        None, ge=2, description="sectors of the whole"
+    )
     cut_faces: Pair | None = Field(
         None, description="two sets of nodes or surfaces, [name, name]; default: the deck's, or found"
     )

@@ -20,6 +20,8 @@ OF_SECTOR = (*mesh.MESH, "mesh_part", "natural_frequency")
 """Variables that the figure of the sector shows."""
 
 _MOST_CLOSE_UPS, _MOST_PAIRS, _MOST_FACES = 2, 20_000, 60_000
+_SIDES, _MOST_PIECES = 8, 20_000
+"""Pieces along a side of a face in contact, whose colour runs from node to node, and of all such faces."""
 
 
 def _read_surface(result: Result) -> mesh.RootSurface | None:
@@ -69,16 +71,31 @@ def _paint(surface: mesh.RootSurface, nodes: FloatArray, of_pairs: FloatArray, s
     norm = Normalize(0.0, scale(float(of_pairs.max())).item() or 1.0)
     at_nodes = np.full(len(nodes), np.nan)
     at_nodes[surface.contact_nodes] = scale(of_pairs[surface.pairs])
-    colours, touch = mesh.rgb(surface.bodies, surface.body), surface.flank >= 0
-    of_faces = at_nodes[surface.faces[touch]].mean(axis=1)
-    colours[touch] = mpl.colormaps[mpl.rcParams["image.cmap"]](norm(of_faces))[:, :3]
+    touch, corners, shades = surface.flank >= 0, nodes[surface.faces], mpl.colormaps[mpl.rcParams["image.cmap"]]
+    body = mesh.rgb(surface.bodies, surface.body)
     for panel, view in zip(panels, [views[-1], *close_ups], strict=True):
-        faces = surface.faces[view.faces]
-        mesh.paint_faces(panel, nodes, faces, colours[view.faces], view)
-        mesh.draw_scale_bar(panel, nodes[np.unique(faces)], view)
+        others, contact = view.faces & ~touch, view.faces & touch
+        pieces, values, n_of_each = _in_pieces(corners[contact], at_nodes[surface.faces[contact]])
+        colours = np.concatenate([body[others], shades(norm(values))[:, :3]])
+        middles = np.concatenate([corners[others], corners[contact].repeat(n_of_each, axis=0)]).mean(axis=1)
+        seen = np.concatenate([corners[others], pieces])
+        mesh.paint_faces(panel, seen, colours, view, middles, len(pieces))
+        mesh.draw_scale_bar(panel, nodes[np.unique(surface.faces[view.faces])], view)
         panel.set_title(view.title)
     plot.add_colour_bar(figure, panels, norm, scale.label(label), fraction=0.05, panchor=False)
     return figure
+
+
+def _in_pieces(corners: FloatArray, values: FloatArray) -> tuple[FloatArray, FloatArray, int]:
+    """Faces (n, 4, 3) in pieces, those of a face together, the value in the middle of each from those at the corners
+    (n, 4), and the number of pieces of a face.
+    """
+    n_sides = max(1, min(_SIDES, int(np.sqrt(_MOST_PIECES / max(1, len(corners))))))
+    row, column = np.divmod(np.arange(n_sides**2), n_sides)
+    u, v = (row[:, None] + np.array([0, 1, 1, 0])) / n_sides, (column[:, None] + np.array([0, 0, 1, 1])) / n_sides
+    weights = np.stack([(1.0 - u) * (1.0 - v), u * (1.0 - v), u * v, (1.0 - u) * v], axis=-1)
+    pieces = np.einsum("pck,fkx->fpcx", weights, corners)
+    return pieces.reshape(-1, 4, 3), np.einsum("pck,fk->fp", weights, values).ravel() / 4.0, n_sides**2
 
 
 def draw_sector(result: Result) -> Drawn:
@@ -90,7 +107,7 @@ def draw_sector(result: Result) -> Drawn:
         nodes, faces, parts = mesh.read_mesh(result)
         names, body = np.unique(parts, return_inverse=True)
         view = mesh.from_aslant(nodes, len(faces))
-        mesh.paint_faces(panels[0], nodes, faces, mesh.rgb(tuple(names.tolist()), body), view)
+        mesh.paint_faces(panels[0], nodes[faces], mesh.rgb(tuple(names.tolist()), body), view)
         mesh.draw_scale_bar(panels[0], nodes, view)
     panel, modes = panels[-1], result.dataset["natural_frequency"].transpose("nodal_diameter", "mode")
     for number, mode in enumerate(modes.values.T):

@@ -1,5 +1,6 @@
 """Reduced models against dense linear algebra, the bundled dovetail and closed forms."""
 
+import re
 from dataclasses import replace
 from itertools import product
 
@@ -169,22 +170,16 @@ def bars(lift, load=0.0):
 def test_the_force_at_rest_of_bars_that_overlap(friction):
     """Without Poisson's effect it is the stiffness of both in a row times the overlap."""
     model = bars(-1e-4)
-    force = float(describe_rest(model, friction).removeprefix("normal forces at rest: sum ").split(" N")[0])
-    assert force == pytest.approx(0.5e9 * 1e-4, rel=1e-3)  # four digits
-    assert describe_rest(model, friction).endswith("9 of 9 pairs closed")
+    said = describe_rest(model, friction)
+    assert float(re.search(r"(\S+) N, 9 of 9 pairs", said)[1]) == pytest.approx(0.5e9 * 1e-4, rel=1e-3)  # four digits
 
 
 @pytest.mark.parametrize(
-    ("lift", "load", "sentence"),
-    [
-        (0.0, 0.0, "no static load and no interference: nothing presses the surfaces together"),
-        (1e-4, 1e3, "at rest no pair carries a force: the joint opens, give a preload"),
-        (0.0, -1e3, "at rest no pair carries a force: the joint opens, give a preload"),
-        (0.0, 1e3, "normal forces at rest: sum 500 N, 9 of 9 pairs closed"),
-    ],
+    ("lift", "load", "words"),
+    [(0.0, 0.0, "no static load"), (1e-4, 1e3, "preload"), (0.0, -1e3, "preload"), (0.0, 1e3, "500 N, 9 of 9 pairs")],
 )
-def test_the_force_at_rest_of_bars_that_are_loaded(lift, load, sentence):
-    assert describe_rest(bars(lift, load), 0.3) == sentence
+def test_the_force_at_rest_of_bars_that_are_loaded(lift, load, words):
+    assert words in describe_rest(bars(lift, load), 0.3)
 
 
 @pytest.mark.parametrize("kind", ["C3D4", "C3D20R"])

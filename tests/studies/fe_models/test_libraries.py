@@ -1,8 +1,10 @@
 """Files that other libraries read; skipped where the library is not installed."""
 
 import importlib.util
+import struct
 import sys
 
+import meshio
 import numpy as np
 import pytest
 
@@ -10,13 +12,29 @@ from studies.fe_models.matrices.read import read_matrices
 from studies.fe_models.meshes import read_mesh_file
 from studies.scene_error import SceneError
 from tests.studies.fe_models.decks import SECTOR, write
+from tests.studies.fe_models.plates import Plates
 
 needs_ansys = pytest.mark.skipif(importlib.util.find_spec("ansys") is None, reason="ansys-mapdl-reader is not there")
 GMSH_41 = SECTOR.with_name("two_tetrahedra.msh").read_text(encoding="ascii")
 
 
-def test_gmsh_41_and_what_is_no_mesh(tmp_path):
-    deck = read_mesh_file(write(tmp_path, GMSH_41, "mesh.msh"))
+def binary_41(text):
+    """The same file in binary, with a node that has a parameter."""
+    sizes = {"Entities": "qqqq iddddddqiq iddddddqiq", "Nodes": "qqqq iiiq qqqqq " + 5 * "ddd"}
+    sizes["Elements"] = "qqqq iiiq qqqq iiiq qqqqq qqqqq"
+    content = text.replace("4.1 0 8", "4.1 1 8\n@").encode()
+    for name, kinds in sizes.items():
+        first, rest = content.split(f"${name}\n".encode())
+        numbers, rest = rest.split(f"$End{name}".encode())
+        packed = struct.pack("<" + kinds.replace(" ", ""), *map(eval, numbers.split()))
+        content = b"".join((first, f"${name}\n".encode(), packed, f"\n$End{name}".encode(), rest))
+    return content.replace(b"@", struct.pack("<i", 1))
+
+
+@pytest.mark.parametrize("content", [GMSH_41.encode(), binary_41(GMSH_41)], ids=["text", "binary"])
+def test_gmsh_41_and_what_is_no_mesh(tmp_path, content):
+    (tmp_path / "mesh.msh").write_bytes(content)
+    deck = read_mesh_file(tmp_path / "mesh.msh")
     assert [(block.kind, block.nodes.tolist()) for block in deck.blocks] == [("C3D4", [[1, 2, 3, 4], [2, 3, 4, 5]])]
     sets = {name: nodes.tolist() for name, nodes in deck.node_sets.items()}
     assert sets == {"UNDER": [1, 2, 3], "BLOCK": [1, 2, 3, 4, 5]}
@@ -25,8 +43,25 @@ def test_gmsh_41_and_what_is_no_mesh(tmp_path):
         read_mesh_file(tmp_path / "mesh.med")
     with pytest.raises(SceneError, match=r"^model: .*none.cdb"):
         read_mesh_file(tmp_path / "none.cdb")
-    with pytest.raises(SceneError, match=r"^model: mesh.msh "):
-        read_mesh_file(write(tmp_path, GMSH_41.replace("1 5 1 5", "1 5 x 5"), "mesh.msh"))
+    damaged = (content[:-40], content.replace(b"4.1", b"4.0"), content.replace(b"$EndNodes", b""))
+    texts = GMSH_41.replace("1 5 1 5", "1 5 x 5"), GMSH_41.replace("\n5\n0 0 0", "\n7\n0 0 0")
+    for each in (*damaged, *map(str.encode, texts)):
+        (tmp_path / "mesh.msh").write_bytes(each)
+        with pytest.raises(SceneError, match=r"^model: mesh.msh "):
+            read_mesh_file(tmp_path / "mesh.msh")
+
+
+@pytest.mark.parametrize("binary", [False, True])
+def test_gmsh_22_as_meshio_writes_it(tmp_path, binary):
+    expected = read_mesh_file(write(tmp_path, Plates().gmsh(), "lap.msh"))
+    meshio.write(tmp_path / "own.msh", meshio.read(tmp_path / "lap.msh", "gmsh"), "gmsh22", binary=binary)
+    found = read_mesh_file(tmp_path / "own.msh")
+    np.testing.assert_array_equal(found.coordinates, expected.coordinates)
+    for one, other in zip(found.blocks, expected.blocks, strict=True):
+        np.testing.assert_array_equal(one.nodes, other.nodes)
+    for name in ("node_sets", "element_sets"):
+        one, other = getattr(found, name), getattr(expected, name)
+        assert {key: each.tolist() for key, each in one.items()} == {key: each.tolist() for key, each in other.items()}
 
 
 def write_cdb(folder, commands, types):
@@ -70,10 +105,8 @@ def test_elements_of_a_cdb_in_another_form(tmp_path, form):
 
 
 def test_missing_libraries(tmp_path, monkeypatch):
-    for library in ("meshio", "ansys.mapdl", "ansys.mapdl.reader"):
+    for library in ("ansys.mapdl", "ansys.mapdl.reader"):
         monkeypatch.setitem(sys.modules, library, None)
-    with pytest.raises(SceneError, match=r"msh needs the library meshio, .*: pip install meshio"):
-        read_mesh_file(write(tmp_path, GMSH_41, "mesh.msh"))
     (tmp_path / "job.full").write_bytes(b"1")
     with pytest.raises(SceneError, match="pip install ansys-mapdl-reader"):
         read_matrices(tmp_path / "job")

@@ -16,15 +16,15 @@ from studies.finite_element.pairing import ContactPairs
 from studies.scene import SurfaceMesh
 from studies.scenes.dovetail_sector import Parameters
 from studyrunner.report.contents import FIGURES
-from studyrunner.report.drawing import COLUMN_WIDTH, Drawing, fit_into_column, plotted_values, style
+from studyrunner.report.drawing import COLUMN_WIDTH, WIDTH, Drawing, fit_into_column, plotted_values, style
 from studyrunner.result.view import Result
 from tests.studyrunner.results import build_file
 
 STUDY = '[study]\nname = "s"\n[scene]\nmodel = "dovetail_sector"\nn_sectors = 47\n'
 
 
-def draw_figure(result: Result, name: str) -> Drawing:
-    found = next(entry for entry in FIGURES if entry.name == name).make(result)
+def draw_figure(result: Result, name: str, width: float = WIDTH) -> Drawing:
+    found = next(entry for entry in FIGURES if entry.name == name).make(result, width)
     assert isinstance(found, Drawing)
     return found
 

@@ -56,7 +56,7 @@ def drawing(name, text="a"):
         panel.set_title(text, parse_math=False)
         return found
 
-    return Drawing(name, f"Title of {text}", f"Caption of {text}", figure(), figure)
+    return Drawing(name, f"Title of {text}", f"Caption of {text}", figure())
 
 
 def test_items_stand_in_their_order_and_nothing_comes_from_elsewhere(tmp_path):
@@ -70,8 +70,7 @@ def test_items_stand_in_their_order_and_nothing_comes_from_elsewhere(tmp_path):
     links = [attributes["href"] or "" for attributes in found.all("a")]
     assert [link for link in links if link.startswith("#")] == [f"#{section}" for section in sections]
     assert all((tmp_path / link).is_file() for link in links if not link.startswith("#"))
-    kinds = (".svg", ".png", "_column.svg", "_column.png", ".csv")
-    names = {name + kind for name in ("first", "second") for kind in kinds}
+    names = {name + kind for name in ("first", "second") for kind in (".svg", ".png", ".csv")}
     assert {path.name for path in tmp_path.iterdir()} == {"some.nc", "index.html", *names}
     for tag, attributes in found.elements:
         assert tag not in ("link", "iframe", "object", "embed", "base")
@@ -79,7 +78,7 @@ def test_items_stand_in_their_order_and_nothing_comes_from_elsewhere(tmp_path):
             assert not re.match(r"\s*(//|(?!data:image)\w+:)", attributes.get(name) or "")
     style = (Path(page.__file__).parent / "browser" / "page.css").read_text(encoding="utf-8")
     assert not re.search(r"url\(|@import", style)
-    assert len(found.all("svg")) == 4  # two figures, whole and as wide as a column
+    assert len(found.all("svg")) == 2
     (policy,) = [each["content"] for each in found.all("meta") if each.get("http-equiv") == "Content-Security-Policy"]
     assert "default-src 'none'" in (policy or "")
 

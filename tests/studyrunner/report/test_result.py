@@ -11,7 +11,7 @@ from studyrunner.api import open_result
 from studyrunner.report import contents
 from studyrunner.report.cli import BAD_INPUT, INTERRUPTED, UNEXPECTED, WRITTEN, main
 from studyrunner.report.contents import draw_report
-from studyrunner.report.drawing import Missing, Table
+from studyrunner.report.drawing import COLUMN_WIDTH, Missing, Table
 from studyrunner.report.page import write_page
 from studyrunner.result.view import open_for_report
 from studyrunner.summary.answer import certainty_of
@@ -116,7 +116,8 @@ def draw(monkeypatch, tmp_path):
     build_file().to_netcdf(tmp_path / "results" / "worn.x.nc")
 
     def use(error=None):
-        def report(_result):
+        def report(_result, width):
+            use.width = width
             if error is not None:
                 raise error
             yield Missing("loops", "[bold]Loops", "Ask for them.")
@@ -129,7 +130,8 @@ def draw(monkeypatch, tmp_path):
 
 
 def test_the_folder_is_named_after_the_file_and_lies_here(draw, tmp_path, capsys):
-    assert main(["results/worn.x.nc", "--no-compute"]) == WRITTEN
+    assert main(["results/worn.x.nc", "--no-compute", "--column"]) == WRITTEN
+    assert draw.width == COLUMN_WIDTH
     said = capsys.readouterr()
     assert (tmp_path / "worn.x-report" / "index.html").is_file()
     (line,) = said.out.splitlines()

@@ -5,6 +5,8 @@ from xml.etree import ElementTree
 import meshio
 import numpy as np
 import pytest
+from matplotlib import colormaps
+from matplotlib.collections import PolyCollection
 
 from studyrunner.report import root
 from studyrunner.report.cli import BAD_INPUT, main
@@ -41,7 +43,7 @@ def test_the_flanks_of_both_bodies_are_found_with_area_and_normals_of_the_pairs(
     pairs, _ = dovetail()
     assert surface.bodies == ("disk", "blade")
     assert surface.flanks == ("intrados", "extrados")
-    areas = np.linalg.norm(face_normals(surface.nodes, surface.faces), axis=1)
+    areas = np.linalg.norm(face_normals(surface.nodes[surface.faces]), axis=1)
     half = len(pairs.area) // 2
     for body, outwards in ((0, -1.0), (1, 1.0)):
         for flank, own in ((0, slice(None, half)), (1, slice(half, None))):
@@ -98,6 +100,9 @@ def test_the_figures_of_the_dovetail(result, surface):
     depth = result.at("wear_depth", result.shown, -1).values
     assert f"at pair {int(np.argmax(depth))}." in worn.caption
     assert f"{surface.exaggeration(float(depth.max())):g} times" in worn.caption.replace("\u00a0", "")
+    # the deepest pair has nearly the colour of the end of the colour bar
+    painted = np.concatenate([each.get_facecolors() for each in worn.figure.findobj(PolyCollection)])
+    assert np.abs(painted - colormaps["cividis"](1.0)).max(axis=1).min() < 0.1
     written = [text.get_text() for panel in numbers.figure.axes for text in panel.texts]
     assert sorted(map(int, written)) == list(range(16))
 
