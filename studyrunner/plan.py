@@ -11,7 +11,7 @@ from studyrunner.kinds import missions, modes, wear_plan
 from studyrunner.kinds.estimate import AUTOMATIC_HARMONICS, COMPILE_SECONDS, largest_memory, memory_a_rank
 from studyrunner.kinds.missions import Mission
 from studyrunner.kinds.modes import Mode
-from studyrunner.kinds.task import Task, TaskPlan
+from studyrunner.kinds.task import Task, TaskPlan, make_table
 from studyrunner.kinds.wear import History, Sweep
 from studyrunner.scene.answers import remarks_of_study
 from studyrunner.scene.scene import SceneFacts, values_of_point
@@ -38,7 +38,7 @@ def build_tasks(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]) -> 
     """
     builders = {MISSIONS.name: missions.build_tasks, MODES.name: modes.build_tasks}
     build = builders.get(study.kind.name, wear_plan.build_tasks)
-    return build(study, scenes, [each.n_displacements for each in facts], contact_changes(study, scenes, facts))
+    return build(study, make_table(study, scenes, facts, contact_changes(study, scenes, facts)))
 
 
 class Effort(NamedTuple):

@@ -4,7 +4,6 @@ There are four kinds of tasks: `Sweep` and `History` (`wear`), `Mode` (`modes`),
 """
 
 import hashlib
-import itertools
 import json
 import math
 from abc import ABC, abstractmethod
@@ -20,13 +19,12 @@ from solver.packing import Packed, unpack
 from solver.settings import Automatic, SolverSettings
 from studyrunner.kinds.estimate import AUTOMATIC_HARMONICS
 from studyrunner.mpi.dispatch import CostKeys
-from studyrunner.scene.scene_set import ContactChange
+from studyrunner.points.table import Column, Points
+from studyrunner.scene.scene import SceneFacts
+from studyrunner.scene.scene_set import ContactChange, SceneSet, frequencies
 from studyrunner.study.sections import AUTO, SOLVER_AXES
 from studyrunner.study.study import Study
 from studyrunner.system.machine import MappedFile, package_digest
-
-Index = tuple[int, ...]
-"""Index of a point along the dimensions of the study."""
 
 Keep = Callable[[Packed | str], None]
 """Takes the progress of a task: data to continue from, or words."""
@@ -155,7 +153,7 @@ class Task(ABC):
     key: str = field(default="", compare=False, repr=False)
     models: tuple[ReducedModel | MappedFile, ...] = field(default=(), compare=False, repr=False)
     variables: tuple[str, ...] = ()
-    indices: tuple[tuple[Index, ...], ...] = ()
+    indices: tuple[tuple[int, ...], ...] = ()
 
     @property
     def order(self) -> tuple[int, ...]:
@@ -197,7 +195,7 @@ class Task(ABC):
         """Most general of the groups."""
         return self.cost_keys[0][:2]
 
-    def points(self, place: int) -> tuple[Index, ...]:
+    def points(self, place: int) -> tuple[int, ...]:
         """Points that have the result at a place."""
         return self.indices[place] if self.indices else ()
 
@@ -260,29 +258,58 @@ class TaskPlan:
         return found
 
 
-def number_points(tasks: Mapping[Any, Sequence[tuple[Index, ...]]], study: Study) -> TaskPlan:
+def number_points(tasks: Mapping[Any, Sequence[Sequence[int]]], n_points: int) -> TaskPlan:
     """The plan of a study without start states. tasks: each, without number and points, with its `indices`."""
     results = tuple(
-        replace(task, number=number, indices=tuple(indices)) for number, (task, indices) in enumerate(tasks.items())
+        replace(task, number=number, indices=tuple(map(tuple, indices)))
+        for number, (task, indices) in enumerate(tasks.items())
     )
-    shared = study.n_points - sum(len(task.order) for task in results)
-    return TaskPlan(results, {EQUAL_POINTS: shared} if shared else {}, study.n_points)
+    shared = n_points - sum(len(task.order) for task in results)
+    return TaskPlan(results, {EQUAL_POINTS: shared} if shared else {}, n_points)
 
 
 # --- from a study to its tasks ---
 
 
-def grid(study: Study) -> Iterator[tuple[dict[str, int], SolverSettings]]:
-    """Points of a part of a study, the last axis fastest: indices along all axes of its kind, and the settings."""
-    names, limit = study.kind.axes, math.inf if study.solver.time_limit is None else study.solver.time_limit
-    solver = []
-    for places in itertools.product(*(range(len(getattr(study.solver, key))) for key in SOLVER_AXES)):
-        at = dict(zip(SOLVER_AXES, places, strict=True))
-        values = {key: getattr(study.solver, key)[place] for key, place in at.items()}
-        solver.append((at, SolverSettings(**values, time_limit=limit)))
-    for places in itertools.product(*(range(len(getattr(study.axes, name))) for name in names)):
-        for at, settings in solver:
-            yield {**dict(zip(names, places, strict=True)), **at}, settings
+@dataclass(frozen=True)
+class Table:
+    """The points of a study, and what tasks are made of.
+
+    columns: "joint", a joint for each block; "law"; "settings"; "frequency" in Hz. n_displacements: of each scene.
+    """
+
+    points: Points
+    columns: Mapping[str, Column]
+    n_displacements: Sequence[int]
+
+    def grouped(self, *columns: Column) -> Iterator[tuple[tuple[Any, ...], list[int]]]:
+        """Combinations of values of columns, as they come first, each with the numbers of its points."""
+        codes, combinations = self.points.walked(*columns)
+        numbers = self.points.numbers[np.argsort(codes, kind="stable")]
+        for each, alike in zip(combinations, np.split(numbers, np.cumsum(np.bincount(codes))[:-1]), strict=True):
+            yield each, alike.tolist()
+
+
+def make_table(
+    study: Study, scenes: SceneSet, facts: Sequence[SceneFacts], contacts: Sequence[Sequence[ContactChange]]
+) -> Table:
+    """The table of a study. facts: of each scene. contacts: what differs in the pairs of each study, by block."""
+    points, limit = scenes.points, math.inf if study.solver.time_limit is None else study.solver.time_limit
+    parts = zip(points.studies, scenes.of_blocks, contacts, strict=True)
+    joints = [
+        tuple(map(joint_of, own.block_studies or (own,), numbers, of_blocks)) for own, numbers, of_blocks in parts
+    ]
+
+    def settings(*values: Any) -> SolverSettings:
+        return SolverSettings(**dict(zip(SOLVER_AXES, values, strict=True)), time_limit=limit)
+
+    columns = {
+        "joint": points.of_studies(joints),
+        "law": points.of_studies([own.wear.as_law for own in points.studies]),
+        "settings": points.combined(settings, *map(points.axis, SOLVER_AXES)),
+        "frequency": frequencies(study, scenes, facts),
+    }
+    return Table(points, columns, [each.n_displacements for each in facts])
 
 
 def up_or_down(n_places: int, direction: str) -> tuple[int, ...]:

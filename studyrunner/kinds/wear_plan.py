@@ -9,16 +9,18 @@ import itertools
 import math
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
-from functools import cache, partial
-from operator import itemgetter
+from dataclasses import dataclass
+from functools import cache
 from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from solver.contact.wear_law import WearLaw
-from solver.settings import SolverSettings, ToTheEnd
+from solver.settings import ToTheEnd
 from studyrunner.kinds.estimate import iterations_of_histories, iterations_of_sweep, seconds_of
-from studyrunner.kinds.task import EQUAL_POINTS, Index, TaskJoint, TaskPlan, grid, joint_of, n_unknowns_of
+from studyrunner.kinds.task import EQUAL_POINTS, Table, TaskPlan, n_unknowns_of
 from studyrunner.kinds.wear import Excitation, History, Integrated, Sweep
-from studyrunner.scene.scene_set import ContactChange, SceneSet
 from studyrunner.study.study import Study
 from studyrunner.variables import OWN_STEPS
 
@@ -45,19 +47,6 @@ class _Values(NamedTuple):
     scheme: str
 
 
-class _Points(NamedTuple):
-    """Points that begin from one start state: of each its values, and its index along the dimensions of the study."""
-
-    values: list[_Values]
-    at: list[Index]
-
-
-_Case = tuple[TaskJoint, Excitation, SolverSettings]
-"""What the states of a sweep have in common."""
-
-_Starts = dict[WearLaw, dict[float, _Points]]
-"""Points by wear law and frequency, in the order of the study."""
-
 _Shared = tuple[Integrated, tuple[tuple[int, ...], ...]]
 """A history that is integrated, and which points, by their numbers, have each history that is read from it."""
 
@@ -68,10 +57,6 @@ class _Together(NamedTuple):
     integrated: tuple[Integrated, ...]
     points: tuple[tuple[int, ...], ...]
     iterations: float
-
-
-_Sharing = Callable[[tuple[_Values, ...]], tuple[tuple[_Together, ...], Counter[str]]]
-"""`_share_histories` of a study: most start states have points with the same values."""
 
 
 class _Histories(Sequence[History]):
@@ -90,9 +75,35 @@ class _Histories(Sequence[History]):
         return tuple(self)[place]
 
 
-def build_tasks(
-    study: Study, scenes: SceneSet, n_displacements: Sequence[int], contacts: Sequence[Sequence[ContactChange]]
-) -> TaskPlan:
+@dataclass(frozen=True)
+class _Starts:
+    """Points in the order of their start states: by sweep, frequency and wear law.
+
+    numbers, kinds (n,): of the points, and of what they differ in, places in `values`. bounds (n_groups + 1,): between
+    points of one start state and wear law. sweep_of, position, laws: of these, by group.
+    """
+
+    numbers: NDArray[np.intp]
+    kinds: NDArray[np.intp]
+    values: Sequence[_Values]
+    bounds: NDArray[np.intp]
+    sweep_of: NDArray[np.intp]
+    position: NDArray[np.intp]
+    laws: Sequence[WearLaw]
+
+    def __iter__(self) -> Iterator[tuple[int, int, WearLaw, NDArray[np.intp], tuple[int, ...]]]:
+        """Sweep, position, law, numbers and kinds of each group."""
+        groups = zip(self.sweep_of.tolist(), self.position.tolist(), self.laws, strict=True)
+        for each, (begin, end) in zip(groups, itertools.pairwise(self.bounds.tolist()), strict=True):
+            yield *each, self.numbers[begin:end], tuple(self.kinds[begin:end].tolist())
+
+
+def _begins(*columns: NDArray[Any]) -> NDArray[np.intp]:
+    """Places at which one of the columns (n,) has another value than before."""
+    return np.flatnonzero(np.any([np.append(True, each[1:] != each[:-1]) for each in columns], axis=0))
+
+
+def build_tasks(study: Study, table: Table) -> TaskPlan:
     """Tasks of a study of wear.
 
     Points whose history is the same for a reason that the study itself shows share a task. Points with a solution of
@@ -105,78 +116,86 @@ def build_tasks(
         "until": study.until,
         "to_the_end": ToTheEnd(len(study.output_counts), study.slow_time.final_share) if study.to_the_end else None,
     }
-    sharing = cache(partial(_share_histories, study))
-    sweeps, of_sweeps, causes, n_histories = list[Sweep](), list[_Starts](), Counter[str](), 0
-    for (joint, excitation, settings), starts in _cases(study, contacts, scenes).items():
-        ascending, direction = sorted(set[float]().union(*starts.values())), excitation.direction
-        n_unknowns = n_unknowns_of(n_displacements[joint.scene], settings.harmonics)
-        case: dict[str, Any] = {"joint": joint, "excitation": excitation, "settings": settings}
-        case |= {"scenes": (joint.scene,), "n_unknowns": n_unknowns}
-        for frequencies in [[one] for one in ascending] if direction == "ramp" else [ascending]:
-            first, whole = (iterations_of_sweep(direction, number) for number in (1, len(frequencies)))
-            case |= {"cost": seconds_of(n_unknowns, whole), "first_share": first / whole}
-            sweeps.append(Sweep(number=len(sweeps), frequencies=tuple(frequencies), **case))
-            of_sweeps.append(starts)
-        for points in itertools.chain.from_iterable(of_law.values() for of_law in starts.values()):
-            tasks, shared = sharing(tuple(points.values))
-            n_histories += len(tasks)
-            causes.update(shared)
+    sweeps, starts = _find_starts(study, table)
 
-    make = partial(_make_histories, tuple(zip(sweeps, of_sweeps, strict=True)), sharing, outputs)
+    @cache
+    def sharing(kinds: tuple[int, ...]) -> tuple[tuple[_Together, ...], Counter[str]]:
+        return _share_histories(study, [starts.values[kind] for kind in kinds])
+
+    causes, n_histories = Counter[str](), 0
+    for *_, kinds in starts:
+        tasks, shared = sharing(kinds)
+        n_histories += len(tasks)
+        causes.update(shared)
     left_out = {reason: causes[cause] for cause, reason in _REASONS.items() if causes[cause]}
-    return TaskPlan(_Histories(make, n_histories), left_out, study.n_points, tuple(sweeps))
+    histories = _Histories(lambda: _make_histories(sweeps, starts, sharing, outputs), n_histories)
+    return TaskPlan(histories, left_out, table.points.n, tuple(sweeps))
+
+
+def _find_starts(study: Study, table: Table) -> tuple[list[Sweep], _Starts]:
+    """The sweeps of a study, and the points that begin from their states."""
+    points, columns = table.points, table.columns
+    own = columns["joint"], points.axis("excitation_amplitude"), points.axis("sweep"), columns["settings"]
+    (case, cases), (line, lines) = points.walked(*own), points.walked(*own, columns["law"])
+    kinds, values = points.walked(*map(points.axis, ("wear_coefficient", "step", "scheme")))
+    places, frequencies = points.walked(columns["frequency"])
+    frequency = np.array(frequencies)[places, 0]
+    order = np.lexsort((line, frequency, case))
+    case, line, frequency = case[order], line[order], frequency[order]
+    groups, first = _begins(case, frequency, line), _begins(case, frequency)
+    sweeps, sweep_of, position = list[Sweep](), np.empty(len(first), np.intp), np.zeros(len(first), np.intp)
+    for begin, end in itertools.pairwise([*_begins(case[first]).tolist(), len(first)]):
+        (joint,), amplitude, direction, settings = cases[case[first[begin]]]
+        n_unknowns = n_unknowns_of(table.n_displacements[joint.scene], settings.harmonics)
+        length = 1 if direction == "ramp" else end - begin
+        one, whole = (iterations_of_sweep(direction, number) for number in (1, length))
+        for place in range(begin, end, length):
+            sweep_of[place : place + length], position[place : place + length] = len(sweeps), np.arange(length)
+            sweep = Sweep(
+                number=len(sweeps),
+                scenes=(joint.scene,),
+                settings=settings,
+                cost=seconds_of(n_unknowns, whole),
+                first_share=one / whole,
+                n_unknowns=n_unknowns,
+                joint=joint,
+                excitation=Excitation(amplitude, direction, study.follow),
+                frequencies=tuple(frequency[first[place : place + length]].tolist()),
+            )
+            sweeps.append(sweep)
+    start = np.searchsorted(first, groups, side="right") - 1
+    laws = [lines[place][-1] for place in line[groups].tolist()]
+    of_points = points.numbers[order], kinds[order], [_Values(*each) for each in values], np.append(groups, len(order))
+    return sweeps, _Starts(*of_points, sweep_of[start], position[start], laws)
 
 
 def _make_histories(
-    sweeps: Sequence[tuple[Sweep, _Starts]], sharing: _Sharing, outputs: Mapping[str, Any]
+    sweeps: Sequence[Sweep],
+    starts: _Starts,
+    sharing: Callable[[tuple[int, ...]], tuple[tuple[_Together, ...], Counter[str]]],
+    outputs: Mapping[str, Any],
 ) -> Iterator[History]:
-    """The histories from the start states of all sweeps, in the order of the study."""
+    """The histories from the start states of all sweeps, in their order. sharing: `_share_histories` of kinds."""
     number = itertools.count()
-    for sweep, starts in sweeps:
-        case = {name: getattr(sweep, name) for name in ("joint", "excitation", "settings", "scenes", "n_unknowns")}
-        for position, frequency in enumerate(sweep.frequencies):
-            for law, of_law in starts.items():
-                values, at = of_law.get(frequency, ((), ()))
-                for together in sharing(tuple(values))[0]:
-                    yield History(
-                        number=next(number),
-                        law=law,
-                        sweep=sweep.number,
-                        position=position,
-                        frequency=frequency,
-                        integrated=together.integrated,
-                        indices=tuple(tuple(at[point] for point in same) for same in together.points),
-                        cost=seconds_of(sweep.n_unknowns, together.iterations),
-                        **case,
-                        **outputs,
-                    )
-
-
-def _cases(study: Study, contacts: Sequence[Sequence[ContactChange]], scenes: SceneSet) -> dict[_Case, _Starts]:
-    """Points that one sweep reaches."""
-    cases, index = dict[_Case, _Starts](), itemgetter(*study.own_axes)
-    for part, (scene,), (contact,) in zip(scenes.parts, scenes.of_blocks, contacts, strict=True):
-        axes, joint, law = part.study.axes, joint_of(part.study, scene, contact), part.study.wear.as_law
-        # by the places on the axes, of which there are few, and not by what stands there
-        of_cases, all_values = dict[tuple[int, ...], dict[float, _Points]](), dict[tuple[int, ...], _Values]()
-        for at, settings in grid(part.study):
-            case = at["excitation_amplitude"], at["sweep"], id(settings)
-            if case not in of_cases:
-                amplitude, direction = axes.excitation_amplitude[case[0]], axes.sweep[case[1]]
-                excitation = Excitation(amplitude, direction, part.study.follow)
-                starts = cases.setdefault((joint, excitation, settings), {})
-                of_cases[case] = starts.setdefault(law, {})
-            frequency, of_law = axes.frequency[at["frequency"]], of_cases[case]
-            if frequency not in of_law:
-                of_law[frequency] = _Points([], [])
-            place = at["wear_coefficient"], at["step"], at["scheme"]
-            if place not in all_values:
-                wear, step, scheme = place
-                all_values[place] = _Values(axes.wear_coefficient[wear], axes.step[step], axes.scheme[scheme])
-            values, indices = of_law[frequency]
-            values.append(all_values[place])
-            indices.append((*index(at), *part.place))
-    return cases
+    for place, position, law, numbers, kinds in starts:
+        sweep = sweeps[place]
+        for together in sharing(kinds)[0]:
+            yield History(
+                number=next(number),
+                scenes=sweep.scenes,
+                settings=sweep.settings,
+                cost=seconds_of(sweep.n_unknowns, together.iterations),
+                n_unknowns=sweep.n_unknowns,
+                indices=tuple(tuple(numbers[list(same)].tolist()) for same in together.points),
+                joint=sweep.joint,
+                excitation=sweep.excitation,
+                law=law,
+                sweep=place,
+                position=position,
+                frequency=sweep.frequencies[position],
+                integrated=together.integrated,
+                **outputs,
+            )
 
 
 def _share_histories(study: Study, points: Sequence[_Values]) -> tuple[tuple[_Together, ...], Counter[str]]:
