@@ -107,7 +107,8 @@ def _overrides(result: Result) -> dict[str, Any]:
         raise UserError(str(result.path), f"scatter.{study.scatter.of_pairs[0]}", None, remedy)
     points = points_of(study)
     part = points.studies[points.at(points.columns["study"], shown)]
-    keys: dict[str, Any] = {f"axes.{axis.key[0]}": None for axis in study.scene_axes}
+    keys: dict[str, Any] = {} if study.design is None else {"points": None}
+    keys |= {f"axes.{axis.key[0]}": None for axis in study.scene_axes}
     # all of them: room for wear is made for the whole history
     keys |= {f"scene.{key}": value for key, value in part.scene.parameters.model_dump(mode="json").items()}
     for name in (*study.kind.axes, *SOLVER_AXES):

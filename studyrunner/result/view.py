@@ -13,6 +13,7 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from solver.outcome import COMPLETE, SENSITIVE_ERROR, Outcome
+from studyrunner.coordinates import POINT
 from studyrunner.result.opening import as_history, open_known, study_tables
 from studyrunner.statistics.study_statistics import statistics_of_file
 from studyrunner.units import show_cycles, show_value
@@ -67,6 +68,13 @@ class Result:
     def varying(self) -> tuple[str, ...]:
         """Axes of more than one value."""
         return tuple(name for name in self.axes if self.dataset.sizes[name] > 1)
+
+    @cached_property
+    def designed(self) -> list[str]:
+        """Columns that differ between the points of a design; none where the points are combinations of the axes."""
+        arrays = self.dataset.coords.items()
+        found = [(str(name), array.values) for name, array in arrays if array.dims == (POINT,) and name != POINT]
+        return [name for name, values in found if (values != values[0]).any()]
 
     @cached_property
     def numerical(self) -> list[str]:
@@ -171,7 +179,7 @@ class Result:
     @cached_property
     def rtol(self) -> NDArray[np.float64]:
         """Relative error that each point was to keep below; NaN where the file does not say."""
-        if "rtol" in self.axes:
+        if self.has("rtol"):
             return self.of_points("rtol").astype(float)
         value = self.study.get("solver", {}).get("rtol")
         return np.full(self.computed.shape, float(value) if isinstance(value, int | float) else math.nan)
@@ -281,6 +289,9 @@ class Result:
         followed = f"the {self.followed}" if self.followed else ""
         names = [name for name in self.axes if name in named and name in point]
         values = {name: show_value(self.dataset[name], point[name]) for name in names}
+        if POINT in values and self.designed:
+            own = ", ".join(show_value(self.dataset[name], point[POINT]) for name in self.designed)
+            values[POINT] += f" ({own})"
         return ", ".join((name == "frequency" and followed) or value for name, value in values.items())
 
 

@@ -144,7 +144,8 @@ def _create_all(
         file.createDimension(name, size)
     of_pairs = sorted((each for each in arrays if each.name.startswith("contact_")), key=lambda each: each.name)
     auxiliary = of_pairs + [each for each in arrays if each.name.startswith(("sample_", "worn_depth"))]
-    auxiliary += [each for each in arrays if each.name == "frequency" and "frequency_ratio" in each.dimensions]
+    designed = {"frequency", *(() if study.design is None else study.design.columns)}
+    auxiliary += [each for each in arrays if each.name in designed and each.dimensions != (each.name,)]
     for name, entry in variables.items():
         dimensions = (*study.dimensions, *entry.dimensions)
         # a chunk of loops holds a single pair: then pairs without loops take no room

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from studyrunner.coordinates import POINT
 from studyrunner.study.text import result_errors
+from studyrunner.system.progress import count
 from studyrunner.user_error import UserError
 
 _WHOLE = 2**53  # from here on, numbers without a fraction may have lost theirs
@@ -76,7 +77,8 @@ class Design:
 
     def _located(self, error: UserError) -> UserError:
         for column in self.columns.values():
-            if f"{error.key}.".startswith(f"axes.{column.key}."):
+            own, whole = f"axes.{column.key}.", f"{error.key}."
+            if whole.startswith(own) or own.startswith(whole):
                 places = [place for place, value in enumerate(column.values) if _same(value, error.value)]
                 if not places:
                     return UserError(self.source, f"column {column.key}", None, error.remedy)
@@ -122,14 +124,16 @@ def _from_file(path: Path, source: str) -> Design:
             header = file.readline()
             delimiter = next((each for each in ";\t" if each in header), ",")
             names = next(csv.reader([header.lstrip("# ")], delimiter=delimiter), [])
-            rows = [row for row in csv.reader(file, delimiter=delimiter) if row]
+            rows = list(csv.reader(file, delimiter=delimiter))
     except (OSError, UnicodeError, csv.Error) as error:
         reason = getattr(error, "strerror", None) or "it is no text in UTF-8 with a header and a row a point"
         raise UserError(source, "the file", None, f"give a CSV file that can be read: {reason}") from None
+    while rows and not rows[-1]:
+        rows.pop()
     for number, row in enumerate(rows):
         if len(row) != len(names):
-            remedy = f"give {len(names)} values, one for each column"
-            raise UserError(source, f"row {number + 2}", ",".join(row), remedy)
+            remedy = f"give {count(len(names), 'value')}, one for each column"
+            raise UserError(source, f"row {number + 2}", delimiter.join(row), remedy)
     columns = [[_parse(text) for text in column] for column in zip(*rows, strict=True)]
     return make_design(source, names, columns or [[] for _ in names], ("row", 2))
 

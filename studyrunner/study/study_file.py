@@ -39,8 +39,9 @@ def read_study(study: str | Path, overrides: Sequence[str] | Mapping[str, object
 
     study: path of a TOML file or of a result file, or the name of a bundled study. overrides: values of keys by their
     dotted names, as `{"slow_time.cycles": 1e4, "axes.frequency": [210.0, 210.5]}`, where numpy arrays and tuples stand
-    for lists; or texts KEY=VALUE, where VALUE is TOML or a bare word. points: a table with a row a point and columns in
-    place of the axes that they are named as: a CSV file, or as `read_design` takes it.
+    for lists; or texts KEY=VALUE, where VALUE is TOML or a bare word. None leaves a key out, `{"points": None}` the design
+    of a result. points: a table with a row a point, and columns in place of the axes that they are named as: a CSV file,
+    or what else `read_design` takes.
 
     Raises UserError where there is no such study or something in it is wrong: a line for each mistake.
     """
@@ -51,7 +52,8 @@ def read_study(study: str | Path, overrides: Sequence[str] | Mapping[str, object
         if is_hdf5(path):
             archived = read_archived(path, source)
             table = read_toml(archived.study.encode(), source)
-            if (columns := cast("Any", table.pop("points", {})).get("columns")) is not None:
+            columns = cast("Any", table.pop("points", {})).get("columns")
+            if columns and not (isinstance(overrides, Mapping) and "points" in overrides):
                 design = read_archived_design(path, source, columns)
                 _insert(table, design)
             scene = _scene_of_result(table, source, design) if archived.holds_scene else None
@@ -60,8 +62,8 @@ def read_study(study: str | Path, overrides: Sequence[str] | Mapping[str, object
     except OSError as error:
         raise UserError(source, "the file", None, f"give a file that can be read: {error.strerror}") from None
     before = None if archived is None else _about_scenes(_tables_of(table, source))
-    _override(table, overrides)
     design = design if points is None else read_design(points)
+    _override(table, overrides, design)
     if design is not None:
         _insert(table, design)
     if archived is not None and _about_scenes(_tables_of(table, source)) != before:
@@ -280,8 +282,14 @@ def _worn_states(study: Study) -> dict[str, object] | None:
 # --- overrides ---
 
 
-def _override(table: scene_axes.Tables, overrides: str | Sequence[str] | Mapping[str, object]) -> None:
-    """Sets keys of a study. overrides: as in `read_study`; a value None leaves a key out. Raises UserError."""
+def _override(
+    table: scene_axes.Tables, overrides: str | Sequence[str] | Mapping[str, object], design: Design | None
+) -> None:
+    """Sets keys of a study. overrides: as in `read_study`; a value None leaves a key out.
+
+    Raises UserError, also where a key is a column of the design.
+    """
+    columns = () if design is None else tuple(column.key for column in design.columns.values())
     if isinstance(overrides, Mapping):
         source, option, given = "overrides", "", [(key, _as_toml(value)) for key, value in overrides.items()]
     else:
@@ -291,13 +299,17 @@ def _override(table: scene_axes.Tables, overrides: str | Sequence[str] | Mapping
         if not isinstance(key, str) or not all(key.split(".")) or not _set_key(table, key, value):
             remedy = "give the dotted name of a key in a table, that of a block with the name of the block"
             raise UserError(source, f"{option}{key}", value, remedy)
+        if key.partition(".")[2] in columns and design is not None:
+            raise UserError(source, f"{option}{key}", value, f"leave it out: it is a column of {design.source}")
 
 
 def _insert(table: scene_axes.Tables, design: Design) -> None:
     """The columns of a design as axes, in place of what stands there, or in the tables that the keys are from."""
     for column in design.columns.values():
-        if not _set_key(table, f"axes.{column.key}", column.values):
-            raise UserError(design.source, f"column {column.key}", None, "give the dotted name of a key under [axes]")
+        is_instead = _INSTEAD.get(f"axes.{column.key}") in design.columns
+        if is_instead or column.key in ("model", "worn") or not _set_key(table, f"axes.{column.key}", column.values):
+            remedy = "leave it out: a column is named as an axis, and frequency stands alone or as frequency_ratio"
+            raise UserError(design.source, f"column {column.key}", None, remedy)
         first, *inner = column.key.split(".")
         for name in ("scene", "wear") if inner else ():
             given = scene_axes.only_table(cast("Any", table.get(name, {})).get(first))
