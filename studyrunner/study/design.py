@@ -104,14 +104,14 @@ def read_design(points: object) -> Design:
     if isinstance(points, str | Path):
         return _from_file(Path(points), str(points))
     if isinstance(points, tuple) and len(points) == 2:
-        matrix, names = np.atleast_2d(np.asarray(points[0])), list(points[1])
+        matrix, names = np.atleast_2d(np.asarray(points[0], dtype=object)), list(points[1])
         if matrix.ndim != 2 or matrix.shape[1] != len(names):
             raise UserError(POINT + "s", "names", names, f"give a name for each of {matrix.shape[-1]} columns")
         return make_design("points", names, matrix.T.tolist(), ("row", 0))
     try:
         table: Any = points
         names = list(table)
-        columns = [np.atleast_1d(np.asarray(table[name])).tolist() for name in names]
+        columns = [np.atleast_1d(np.asarray(table[name], dtype=object)).tolist() for name in names]
     except (TypeError, KeyError, IndexError):
         remedy = "give a CSV file, a table of pandas, arrays by name, or (matrix, names)"
         raise UserError("points", "type", type(points).__name__, remedy) from None
@@ -165,6 +165,7 @@ def make_design(
     for (key, unit), column in zip(parts, values, strict=True):
         if not key or key.replace(".", "_") in columns:
             raise UserError(source, f"column {key or len(columns) + 1}", None, "give each column an axis of its own")
+        column = [value.item() if isinstance(value, np.generic) else value for value in column]
         for row, value in enumerate(column):
             if value is None or value == "" or not isinstance(value, bool | int | float | str):
                 raise design.error(row, key, None if value == "" else value, "missing: give a number or a name")

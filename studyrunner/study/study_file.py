@@ -1,6 +1,7 @@
 """Reads a study: finds the file, applies the overrides, checks all of it; and writes the effective study as TOML."""
 
 import contextlib
+import copy
 import json
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -39,33 +40,32 @@ def read_study(study: str | Path, overrides: Sequence[str] | Mapping[str, object
 
     study: path of a TOML file or of a result file, or the name of a bundled study. overrides: values of keys by their
     dotted names, as `{"slow_time.cycles": 1e4, "axes.frequency": [210.0, 210.5]}`, where numpy arrays and tuples stand
-    for lists; or texts KEY=VALUE, where VALUE is TOML or a bare word. None leaves a key out, `{"points": None}` the design
-    of a result. points: a table with a row a point, and columns in place of the axes that they are named as: a CSV file,
-    or what else `read_design` takes.
+    for lists, and None leaves a key out, as "points" the design of a result; or texts KEY=VALUE, where VALUE is TOML or
+    a bare word. points: a table with a row a point, and columns in place of the axes that they are named as, in a file
+    or as `read_design` takes it.
 
     Raises UserError where there is no such study or something in it is wrong: a line for each mistake.
     """
     source = str(study)
     path = _study_path(source)
-    archived, scene, design = None, None, None
+    archived, scene, design, before = None, None, None, ""
     try:
         if is_hdf5(path):
             archived = read_archived(path, source)
             table = read_toml(archived.study.encode(), source)
             columns = cast("Any", table.pop("points", {})).get("columns")
-            if columns and not (isinstance(overrides, Mapping) and "points" in overrides):
-                design = read_archived_design(path, source, columns)
-                _insert(table, design)
-            scene = _scene_of_result(table, source, design) if archived.holds_scene else None
+            design = read_archived_design(path, source, columns) if columns else None
+            whole = _with_design(table, design)
+            scene = _scene_of_result(whole, source, design) if archived.holds_scene else None
+            before = _about_scenes(_tables_of(whole, source))
         else:
             table = read_toml(path, source)
     except OSError as error:
         raise UserError(source, "the file", None, f"give a file that can be read: {error.strerror}") from None
-    before = None if archived is None else _about_scenes(_tables_of(table, source))
-    design = design if points is None else read_design(points)
+    if points is not None or (isinstance(overrides, Mapping) and "points" in overrides):
+        design = None if points is None else read_design(points)
     _override(table, overrides, design)
-    if design is not None:
-        _insert(table, design)
+    table = _with_design(table, design)
     if archived is not None and _about_scenes(_tables_of(table, source)) != before:
         archived = replace(archived, scene_sha256=None)
     with contextlib.nullcontext() if design is None else design.errors():
@@ -303,8 +303,11 @@ def _override(
             raise UserError(source, f"{option}{key}", value, f"leave it out: it is a column of {design.source}")
 
 
-def _insert(table: scene_axes.Tables, design: Design) -> None:
-    """The columns of a design as axes, in place of what stands there, or in the tables that the keys are from."""
+def _with_design(given: Mapping[str, object], design: Design | None) -> scene_axes.Tables:
+    """A study with the columns of a design as axes, in place of what stands there, or in the tables of their keys."""
+    table = dict(copy.deepcopy(given))
+    if design is None:
+        return table
     for column in design.columns.values():
         is_instead = _INSTEAD.get(f"axes.{column.key}") in design.columns
         if is_instead or column.key in ("model", "worn") or not _set_key(table, f"axes.{column.key}", column.values):
@@ -312,9 +315,10 @@ def _insert(table: scene_axes.Tables, design: Design) -> None:
             raise UserError(design.source, f"column {column.key}", None, remedy)
         first, *inner = column.key.split(".")
         for name in ("scene", "wear") if inner else ():
-            given = scene_axes.only_table(cast("Any", table.get(name, {})).get(first))
-            if isinstance(given, dict):
-                given.pop(inner[0], None)
+            own = scene_axes.only_table(cast("Any", table.get(name, {})).get(first))
+            if isinstance(own, dict):
+                own.pop(inner[0], None)
+    return table
 
 
 def _set_key(table: scene_axes.Tables, key: str, value: object) -> bool:
