@@ -10,7 +10,7 @@ from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -124,6 +124,21 @@ class Identity:
         return (self.scenes[joint.scene], joint.friction_coefficient, *joint.contact, package_digest("solver"))
 
 
+class Work(NamedTuple):
+    """What tasks take that are alike. way: what they do. n_results: that are computed, not read from others.
+
+    n_unknowns: most of one. seconds, longest: estimated time of all, and of one. start: the sweep that they wait for.
+    """
+
+    way: str
+    n_tasks: int
+    n_results: int
+    n_unknowns: int
+    seconds: float
+    longest: float
+    start: int | None = None
+
+
 @dataclass(frozen=True, kw_only=True)
 class Task(ABC):
     """A task, which gives one result or several, one after the other, each at a place of its own.
@@ -195,6 +210,17 @@ class Task(ABC):
         """Most general of the groups."""
         return self.cost_keys[0][:2]
 
+    @property
+    def way(self) -> str:
+        """What it does, in a word."""
+        return type(self).__name__.lower()
+
+    @property
+    def work(self) -> Work:
+        """What it takes."""
+        start = None if self.waits_for is None else self.waits_for[0]
+        return Work(self.way, 1, self.n_results, self.n_unknowns, self.cost, self.cost, start)
+
     def points(self, place: int) -> tuple[int, ...]:
         """Points that have the result at a place."""
         return self.indices[place] if self.indices else ()
@@ -238,6 +264,13 @@ class TaskPlan:
     left_out: Mapping[str, int]
     n_points: int
     sweeps: tuple[Task, ...] = ()
+
+    @property
+    def works(self) -> Iterator[Work]:
+        """What the tasks take, the sweeps first, without the tasks themselves: there may be a million of them."""
+        yield from (task.work for task in self.sweeps)
+        own = getattr(self.results, "works", None)
+        yield from (task.work for task in self.results) if own is None else own()
 
     def named(self, identity: Identity) -> "TaskPlan":
         """The plan with the names and keys of its tasks."""

@@ -10,7 +10,7 @@ import math
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from solver.contact.wear_law import WearLaw
 from solver.settings import ToTheEnd
 from studyrunner.kinds.estimate import iterations_of_histories, iterations_of_sweep, seconds_of
-from studyrunner.kinds.task import EQUAL_POINTS, Table, TaskPlan, n_unknowns_of
+from studyrunner.kinds.task import EQUAL_POINTS, Table, TaskPlan, Work, n_unknowns_of
 from studyrunner.kinds.wear import Excitation, History, Integrated, Sweep
 from studyrunner.study.study import Study
 from studyrunner.variables import OWN_STEPS
@@ -27,6 +27,8 @@ from studyrunner.variables import OWN_STEPS
 MOST_TOGETHER = 4
 """Histories of one task, which share the adaptive history that given steps are compared with. It takes about as long as
 one of them: with 4 a fifth more than with all, and another rank may take the rest."""
+
+_MOST_KNOWN = 1000  # ways to share histories: with equal values most start states have the same, others one of their own
 
 _REASONS = {
     "cycles": "only the unworn states are asked for, the same for every step and scheme",
@@ -62,8 +64,9 @@ class _Together(NamedTuple):
 class _Histories(Sequence[History]):
     """The histories of a study, each made when it is asked for: `--plan` of 10^6 points takes a fifth of the memory."""
 
-    def __init__(self, make: Callable[[], Iterator[History]], length: int) -> None:
-        self._make, self._length = make, length
+    def __init__(self, make: Callable[[], Iterator[History]], length: int, works: Callable[[], Iterator[Work]]) -> None:
+        """works: what all of them take, by start state."""
+        self._make, self._length, self.works = make, length, works
 
     def __len__(self) -> int:
         return self._length
@@ -118,7 +121,7 @@ def build_tasks(study: Study, table: Table) -> TaskPlan:
     }
     sweeps, starts = _find_starts(study, table)
 
-    @cache
+    @lru_cache(_MOST_KNOWN)
     def sharing(kinds: tuple[int, ...]) -> tuple[tuple[_Together, ...], Counter[str]]:
         return _share_histories(study, [starts.values[kind] for kind in kinds])
 
@@ -128,7 +131,21 @@ def build_tasks(study: Study, table: Table) -> TaskPlan:
         n_histories += len(tasks)
         causes.update(shared)
     left_out = {reason: causes[cause] for cause, reason in _REASONS.items() if causes[cause]}
-    histories = _Histories(lambda: _make_histories(sweeps, starts, sharing, outputs), n_histories)
+
+    @lru_cache(_MOST_KNOWN)
+    def effort(kinds: tuple[int, ...]) -> tuple[int, int, float, float]:
+        tasks = sharing(kinds)[0]
+        iterations = [each.iterations for each in tasks]
+        return len(tasks), sum(len(each.integrated) for each in tasks), sum(iterations), max(iterations)
+
+    def works() -> Iterator[Work]:
+        for place, *_, kinds in starts:
+            n_tasks, n_results, *iterations = effort(kinds)
+            n_unknowns = sweeps[place].n_unknowns
+            seconds, longest = (seconds_of(n_unknowns, number) for number in iterations)
+            yield Work("history", n_tasks, n_results, n_unknowns, seconds, longest, place)
+
+    histories = _Histories(lambda: _make_histories(sweeps, starts, sharing, outputs), n_histories, works)
     return TaskPlan(histories, left_out, table.points.n, tuple(sweeps))
 
 

@@ -161,7 +161,7 @@ def _check_study(table: Mapping[str, object], origin: Origin, design: Design | N
                 known = studies[0].scene if studies else None
                 own = {"scene": find_scene(scene, origin, known), "wear": checked["wear"]}
                 study = Study.model_construct(**{**given_tables, **fixed, **own})
-                raise_wrong(source, broken_rules(study))
+                raise_wrong(source, broken_rules(study, first=not studies))
                 study = study.model_copy(update={"scene_axes": ()})
                 studies.append(_complete(_with_block_studies(study, given["scene"], origin)))
     study = studies[0]
