@@ -2,8 +2,8 @@
 
 from studyrunner.variables import Variable
 
-POINT = "point"
-"""Dimension of points that are rows of a design."""
+POINT, SAMPLE = "point", "sample"
+"""Dimensions of points that are rows of a table, and of drawn values."""
 
 _AUXILIARY, _REFERENCE = "auxiliaryInformation", "referenceInformation"
 _UNPLACED = "NaN where the scene does not say."
@@ -84,7 +84,7 @@ COORDINATES = {
     "rtol": Variable((), "1", "relative error that automatic settings and adaptive steps aim at"),
     "modal_amplitude": Variable((), "m kg^0.5", "modal amplitude", "sqrt(x^H M x), x: first harmonic, M: mass matrix."),
     POINT: Variable((), "1", "number of the point", "A row of the design, from 0; its values are coordinates."),
-    "sample": Variable((), "1", "number of the sample", "What it draws is in the coordinates sample_..."),
+    SAMPLE: Variable((), "1", "number of the sample", "What it draws is in the coordinates sample_..."),
     "cycle": Variable((), "1", "number of vibration cycles", "Slow time."),
     "mission": Variable((), "1", "number of missions", "Slow time."),
     "block": Variable((), "1", "name of the block of the mission", "In their order in a mission."),

@@ -28,7 +28,9 @@ MOST_TOGETHER = 4
 """Histories of one task, which share the adaptive history that given steps are compared with. It takes about as long as
 one of them: with 4 a fifth more than with all, and another rank may take the rest."""
 
-_MOST_KNOWN = 1000  # ways to share histories: with equal values most start states have the same, others one of their own
+_MOST_KNOWN = (
+    1000  # ways to share histories: with equal values most start states have the same, others one of their own
+)
 
 _REASONS = {
     "cycles": "only the unworn states are asked for, the same for every step and scheme",

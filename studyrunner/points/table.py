@@ -8,9 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from studyrunner.coordinates import POINT
+from studyrunner.coordinates import POINT, SAMPLE
 from studyrunner.points.draw import samples_of
-from studyrunner.statistics.samples import SAMPLE
 from studyrunner.study.design import group_rows
 from studyrunner.study.sections import SOLVER_AXES, AxesSection
 from studyrunner.study.study import Study

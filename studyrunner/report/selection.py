@@ -10,10 +10,9 @@ import xarray as xr
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-from studyrunner.coordinates import POINT
+from studyrunner.coordinates import POINT, SAMPLE
 from studyrunner.report.drawing import FloatArray, line_style, set_log
 from studyrunner.result.view import Result
-from studyrunner.statistics.samples import SAMPLE
 from studyrunner.units import Scale, scale_for, units_of
 
 _DECADES = 30.0  # largest over smallest value from which an axis is logarithmic

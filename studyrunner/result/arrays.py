@@ -6,13 +6,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.outcome import Outcome
-from studyrunner.coordinates import COORDINATES, POINT, STUCK_FREQUENCY, WORN_DEPTH
+from studyrunner.coordinates import COORDINATES, POINT, SAMPLE, STUCK_FREQUENCY, WORN_DEPTH
 from studyrunner.points.draw import block_of_input
 from studyrunner.points.table import Column, Points
 from studyrunner.scene import scene_set
 from studyrunner.scene.answers import SmallArray
 from studyrunner.scene.scene import SceneFacts
-from studyrunner.statistics.samples import SAMPLE
 from studyrunner.study.scene_axes import describe_key
 from studyrunner.study.sections import SOLVER_AXES
 from studyrunner.study.study import NUMBERS, Study

@@ -17,8 +17,8 @@ import numpy as np
 import xarray as xr
 
 from solver.outcome import Outcome
-from studyrunner.coordinates import COORDINATES, POINT, SCENE, STUCK_FREQUENCY, WORN_DEPTH
-from studyrunner.statistics.samples import DRAWN, SAMPLE
+from studyrunner.coordinates import COORDINATES, POINT, SAMPLE, SCENE, STUCK_FREQUENCY, WORN_DEPTH
+from studyrunner.statistics.samples import DRAWN
 from studyrunner.study.text import check_result_file, read_toml
 from studyrunner.user_error import UserError, Verbatim, show_text
 from studyrunner.values import Wrong

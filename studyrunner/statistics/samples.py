@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from scipy.stats import beta, binom, norm, rankdata, sobol_indices
 
 Array = NDArray[np.float64]
-SAMPLE, CYCLE = "sample", "cycle"
+CYCLE = "cycle"
 DRAWN = "sample_"
 """How the coordinates with drawn values begin."""
 

@@ -10,9 +10,8 @@ from pydantic import Field, InstanceOf
 
 from solver.settings import TARGETS, FollowedFrequency, WearTarget
 from studyrunner import variables
-from studyrunner.coordinates import POINT, SCENE
+from studyrunner.coordinates import POINT, SAMPLE, SCENE
 from studyrunner.scatter import ScatterSection
-from studyrunner.statistics.samples import SAMPLE
 from studyrunner.study import sections
 from studyrunner.study.design import Design
 from studyrunner.study.scene_axes import SceneAxis

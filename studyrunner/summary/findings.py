@@ -13,9 +13,9 @@ import numpy as np
 import xarray as xr
 
 from solver.outcome import SENSITIVE_ERROR, Outcome, absolute
+from studyrunner.coordinates import SAMPLE
 from studyrunner.result.pairs import contact_pairs, has_depths, last_depth
 from studyrunner.result.view import NO_MOTION, NO_VOLUME, Point, Result
-from studyrunner.statistics.samples import SAMPLE
 from studyrunner.statistics.study_statistics import describe_ranking, describe_volumes
 from studyrunner.system.progress import count
 from studyrunner.units import scale_for, show_cycles, show_known, show_number, show_percent

@@ -12,13 +12,12 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.patches import Patch
 
 from solver.outcome import Outcome, absolute
-from studyrunner.coordinates import POINT
+from studyrunner.coordinates import POINT, SAMPLE
 from studyrunner.report import drawing as plot
 from studyrunner.report.drawing import COLOURS, Drawn, FloatArray, Table, as_sentences
 from studyrunner.report.selection import choose, find_course, slow_time, spans_decades
 from studyrunner.result.opening import describe_outcome
 from studyrunner.result.view import NO_VOLUME, Result
-from studyrunner.statistics.samples import SAMPLE
 from studyrunner.statistics.study_statistics import describe_ranking, measure_of
 from studyrunner.system.progress import count
 from studyrunner.units import Scale, scale_for, show_cycles, show_known, show_number, units_of
