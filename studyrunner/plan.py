@@ -1,5 +1,6 @@
 """The tasks of a study, whatever its kind, what `--plan` says of them, and questions about values that are far off."""
 
+import itertools
 import math
 import time
 from collections import Counter
@@ -70,7 +71,7 @@ def effort_of(works: Iterable[Work]) -> Effort:
     parts = {
         f"{count(n_starts, 'start state')} by {by}": n_starts,
         count(n_results["history"], "wear history", "wear histories"): n_results["history"],
-        f"{modes} over the amplitude, {count(n_results['mode'], 'point')}": n_results["mode"],
+        f"{modes}, {count(n_results['mode'], 'point')}": n_results["mode"],
         f"{count(n_of['mission'], 'mission history', 'mission histories')}, each computed by one rank": n_of["mission"],
     }
     words = ", and ".join(text for text, number in parts.items() if number)
@@ -84,7 +85,7 @@ def plan_lines(study: Study, say: Callable[[str], None]) -> list[str]:
     built_with = largest_memory() - before
     plan, largest = build_tasks(study, scenes, facts), merge_facts(facts)
     seconds = time.process_time() + seconds_left
-    effort = effort_of(plan.works)
+    effort = effort_of(itertools.chain((sweep.work for sweep in plan.sweeps), plan.works()))
     rows = [
         *_of_study(study, facts, plan, effort),
         *_of_effort(study, largest, plan, effort, built_with, seconds),

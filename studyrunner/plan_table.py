@@ -22,7 +22,7 @@ def print_table(study: Study, say: Progress, file: TextIO) -> None:
     arrays = [*coordinates(study, facts, scenes), *sample_coordinates(study, facts, scenes)]
     arrays = [each for each in arrays if each.dimensions and {*each.dimensions} <= points.dims.keys()]
     of_task: list[tuple[object, ...]] = [()] * points.n
-    for task in plan.results:
+    for task in plan.make():
         sweep = () if task.waits_for is None else (task.waits_for[0], f"{plan.sweeps[task.waits_for[0]].cost:.3g}")
         numbers = [number for place in task.order for number in task.points(place)]
         about = " ".join(map(str, task.scenes)), task.number, f"{task.cost:.3g}", len(numbers), *sweep

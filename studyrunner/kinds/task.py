@@ -256,21 +256,21 @@ def digest(*values: object) -> str:
 class TaskPlan:
     """All tasks of a study.
 
-    results: tasks that give the results of points; histories wait for a start state. sweeps: they give start states.
-    left_out: numbers of points that are not computed alone, by reason. n_points: of the study.
+    make: the tasks that give the results of points; histories wait for a start state. works: what they take, also of a
+    million of them. sweeps: the tasks that give start states. left_out: numbers of points that are not computed alone,
+    by reason. n_points: of the study.
     """
 
-    results: Sequence[Task]
+    make: Callable[[], Iterator[Task]]
+    works: Callable[[], Iterator[Work]]
     left_out: Mapping[str, int]
     n_points: int
     sweeps: tuple[Task, ...] = ()
 
-    @property
-    def works(self) -> Iterator[Work]:
-        """What the tasks take, the sweeps first, without the tasks themselves: there may be a million of them."""
-        yield from (task.work for task in self.sweeps)
-        own = getattr(self.results, "works", None)
-        yield from (task.work for task in self.results) if own is None else own()
+    @cached_property
+    def results(self) -> tuple[Task, ...]:
+        """The tasks that give the results of points."""
+        return tuple(self.make())
 
     def named(self, identity: Identity) -> "TaskPlan":
         """The plan with the names and keys of its tasks."""
@@ -279,8 +279,7 @@ class TaskPlan:
             names = task.hashes(identity)
             return replace(task, names=names, key=digest("task", names))
 
-        sweeps, results = (tuple(map(with_names, tasks)) for tasks in (self.sweeps, self.results))
-        return replace(self, sweeps=sweeps, results=results)
+        return replace(self, sweeps=tuple(map(with_names, self.sweeps)), make=lambda: map(with_names, self.make()))
 
     @cached_property
     def waiting(self) -> Mapping[tuple[int, int] | None, Sequence[Task]]:
@@ -298,7 +297,8 @@ def number_points(tasks: Mapping[Any, Sequence[Sequence[int]]], n_points: int) -
         for number, (task, indices) in enumerate(tasks.items())
     )
     shared = n_points - sum(len(task.order) for task in results)
-    return TaskPlan(results, {EQUAL_POINTS: shared} if shared else {}, n_points)
+    left_out = {EQUAL_POINTS: shared} if shared else {}
+    return TaskPlan(results.__iter__, lambda: (task.work for task in results), left_out, n_points)
 
 
 # --- from a study to its tasks ---

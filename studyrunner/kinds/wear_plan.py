@@ -9,8 +9,7 @@ import itertools
 import math
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -63,44 +62,21 @@ class _Together(NamedTuple):
     iterations: float
 
 
-class _Histories(Sequence[History]):
-    """The histories of a study, each made when it is asked for: `--plan` of 10^6 points takes a fifth of the memory."""
+class _Group(NamedTuple):
+    """Points that begin from one start state with one wear law: their numbers, and what they differ in.
 
-    def __init__(self, make: Callable[[], Iterator[History]], length: int, works: Callable[[], Iterator[Work]]) -> None:
-        """works: what all of them take, by start state."""
-        self._make, self._length, self.works = make, length, works
-
-    def __len__(self) -> int:
-        return self._length
-
-    def __iter__(self) -> Iterator[History]:
-        return self._make()
-
-    def __getitem__(self, place: Any) -> Any:
-        return tuple(self)[place]
-
-
-@dataclass(frozen=True)
-class _Starts:
-    """Points in the order of their start states: by sweep, frequency and wear law.
-
-    numbers, kinds (n,): of the points, and of what they differ in, places in `values`. bounds (n_groups + 1,): between
-    points of one start state and wear law. sweep_of, position, laws: of these, by group.
+    sweep, position: of the start state.
     """
 
+    sweep: Sweep
+    position: int
+    law: WearLaw
     numbers: NDArray[np.intp]
-    kinds: NDArray[np.intp]
-    values: Sequence[_Values]
-    bounds: NDArray[np.intp]
-    sweep_of: NDArray[np.intp]
-    position: NDArray[np.intp]
-    laws: Sequence[WearLaw]
+    values: tuple[_Values, ...]
 
-    def __iter__(self) -> Iterator[tuple[int, int, WearLaw, NDArray[np.intp], tuple[int, ...]]]:
-        """Sweep, position, law, numbers and kinds of each group."""
-        groups = zip(self.sweep_of.tolist(), self.position.tolist(), self.laws, strict=True)
-        for each, (begin, end) in zip(groups, itertools.pairwise(self.bounds.tolist()), strict=True):
-            yield *each, self.numbers[begin:end], tuple(self.kinds[begin:end].tolist())
+
+_Sharing = Callable[[tuple[_Values, ...]], tuple[tuple[_Together, ...], Counter[str]]]
+"""`_share_histories` of a study: most start states have points with the same values."""
 
 
 def _begins(*columns: NDArray[Any]) -> NDArray[np.intp]:
@@ -121,55 +97,42 @@ def build_tasks(study: Study, table: Table) -> TaskPlan:
         "until": study.until,
         "to_the_end": ToTheEnd(len(study.output_counts), study.slow_time.final_share) if study.to_the_end else None,
     }
-    sweeps, starts = _find_starts(study, table)
-
-    @lru_cache(_MOST_KNOWN)
-    def sharing(kinds: tuple[int, ...]) -> tuple[tuple[_Together, ...], Counter[str]]:
-        return _share_histories(study, [starts.values[kind] for kind in kinds])
-
-    causes, n_histories = Counter[str](), 0
-    for *_, kinds in starts:
-        tasks, shared = sharing(kinds)
-        n_histories += len(tasks)
-        causes.update(shared)
+    sharing: _Sharing = lru_cache(_MOST_KNOWN)(partial(_share_histories, study))
+    sweeps, groups = _find_starts(study, table)
+    causes = Counter[str]()
+    for group in groups():
+        causes.update(sharing(group.values)[1])
     left_out = {reason: causes[cause] for cause, reason in _REASONS.items() if causes[cause]}
 
-    @lru_cache(_MOST_KNOWN)
-    def effort(kinds: tuple[int, ...]) -> tuple[int, int, float, float]:
-        tasks = sharing(kinds)[0]
-        iterations = [each.iterations for each in tasks]
-        return len(tasks), sum(len(each.integrated) for each in tasks), sum(iterations), max(iterations)
-
     def works() -> Iterator[Work]:
-        for place, *_, kinds in starts:
-            n_tasks, n_results, *iterations = effort(kinds)
-            n_unknowns = sweeps[place].n_unknowns
-            seconds, longest = (seconds_of(n_unknowns, number) for number in iterations)
-            yield Work("history", n_tasks, n_results, n_unknowns, seconds, longest, place)
+        for sweep, *_, values in groups():
+            tasks, n_unknowns = sharing(values)[0], sweep.n_unknowns
+            costs = [seconds_of(n_unknowns, each.iterations) for each in tasks]
+            n_integrated = sum(len(each.integrated) for each in tasks)
+            yield Work("history", len(tasks), n_integrated, n_unknowns, sum(costs), max(costs), sweep.number)
 
-    histories = _Histories(lambda: _make_histories(sweeps, starts, sharing, outputs), n_histories, works)
-    return TaskPlan(histories, left_out, table.points.n, tuple(sweeps))
+    make = partial(_make_histories, groups, sharing, outputs)
+    return TaskPlan(make, works, left_out, table.points.n, tuple(sweeps))
 
 
-def _find_starts(study: Study, table: Table) -> tuple[list[Sweep], _Starts]:
-    """The sweeps of a study, and the points that begin from their states."""
+def _find_starts(study: Study, table: Table) -> tuple[list[Sweep], Callable[[], Iterator[_Group]]]:
+    """The sweeps of a study, and the points that begin from their states, made anew each time: there may be many."""
     points, columns = table.points, table.columns
     own = columns["joint"], points.axis("excitation_amplitude"), points.axis("sweep"), columns["settings"]
     (case, cases), (line, lines) = points.walked(*own), points.walked(*own, columns["law"])
-    kinds, values = points.walked(*map(points.axis, ("wear_coefficient", "step", "scheme")))
+    kind, kinds = points.walked(*map(points.axis, ("wear_coefficient", "step", "scheme")))
     places, frequencies = points.walked(columns["frequency"])
     frequency = np.array(frequencies)[places, 0]
     order = np.lexsort((line, frequency, case))
     case, line, frequency = case[order], line[order], frequency[order]
-    groups, first = _begins(case, frequency, line), _begins(case, frequency)
-    sweeps, sweep_of, position = list[Sweep](), np.empty(len(first), np.intp), np.zeros(len(first), np.intp)
+    bounds, first = _begins(case, frequency, line), _begins(case, frequency)
+    sweeps, of_start = list[Sweep](), list[tuple[Sweep, int]]()
     for begin, end in itertools.pairwise([*_begins(case[first]).tolist(), len(first)]):
         (joint,), amplitude, direction, settings = cases[case[first[begin]]]
         n_unknowns = n_unknowns_of(table.n_displacements[joint.scene], settings.harmonics)
         length = 1 if direction == "ramp" else end - begin
         one, whole = (iterations_of_sweep(direction, number) for number in (1, length))
         for place in range(begin, end, length):
-            sweep_of[place : place + length], position[place : place + length] = len(sweeps), np.arange(length)
             sweep = Sweep(
                 number=len(sweeps),
                 scenes=(joint.scene,),
@@ -182,23 +145,26 @@ def _find_starts(study: Study, table: Table) -> tuple[list[Sweep], _Starts]:
                 frequencies=tuple(frequency[first[place : place + length]].tolist()),
             )
             sweeps.append(sweep)
-    start = np.searchsorted(first, groups, side="right") - 1
-    laws = [lines[place][-1] for place in line[groups].tolist()]
-    of_points = points.numbers[order], kinds[order], [_Values(*each) for each in values], np.append(groups, len(order))
-    return sweeps, _Starts(*of_points, sweep_of[start], position[start], laws)
+            of_start += [(sweep, position) for position in range(length)]
+    start, numbers, values = np.searchsorted(first, bounds, side="right") - 1, points.numbers[order], kind[order]
+    known = [_Values(*each) for each in kinds]
+
+    def groups() -> Iterator[_Group]:
+        ends = np.append(bounds[1:], len(order)).tolist()
+        for at, begin, end in zip(start.tolist(), bounds.tolist(), ends, strict=True):
+            (sweep, position), own = of_start[at], tuple(known[place] for place in values[begin:end].tolist())
+            yield _Group(sweep, position, lines[line[begin]][-1], numbers[begin:end], own)
+
+    return sweeps, groups
 
 
 def _make_histories(
-    sweeps: Sequence[Sweep],
-    starts: _Starts,
-    sharing: Callable[[tuple[int, ...]], tuple[tuple[_Together, ...], Counter[str]]],
-    outputs: Mapping[str, Any],
+    groups: Callable[[], Iterator[_Group]], sharing: _Sharing, outputs: Mapping[str, Any]
 ) -> Iterator[History]:
-    """The histories from the start states of all sweeps, in their order. sharing: `_share_histories` of kinds."""
+    """The histories of a study, in the order of their start states."""
     number = itertools.count()
-    for place, position, law, numbers, kinds in starts:
-        sweep = sweeps[place]
-        for together in sharing(kinds)[0]:
+    for sweep, position, law, numbers, values in groups():
+        for together in sharing(values)[0]:
             yield History(
                 number=next(number),
                 scenes=sweep.scenes,
@@ -209,7 +175,7 @@ def _make_histories(
                 joint=sweep.joint,
                 excitation=sweep.excitation,
                 law=law,
-                sweep=place,
+                sweep=sweep.number,
                 position=position,
                 frequency=sweep.frequencies[position],
                 integrated=together.integrated,

@@ -54,7 +54,7 @@ def small_arrays(
         SmallArray(
             "stuck_frequency", *scenes.along_axes([np.array(each.stuck_frequency) for each in facts]), STUCK_FREQUENCY
         ),
-        *_worn_coordinate(study, facts),
+        *_worn_coordinate(study, facts, points),
         *sample_coordinates(study, facts, scenes),
         *of_scene,
     ]
@@ -117,16 +117,12 @@ def _coordinate_entry(study: Study, name: str) -> Variable:
     return COORDINATES[name]
 
 
-def _worn_coordinate(study: Study, facts: Sequence[SceneFacts]) -> Iterator[SmallArray]:
+def _worn_coordinate(study: Study, facts: Sequence[SceneFacts], points: Points) -> Iterator[SmallArray]:
     """Wear depths with which the histories begin; none where the study has several scenes or no worn one."""
-    if study.scene.worn is None or len(facts) > 1:
-        return
-    axis = next((axis for axis in study.scene_axes if axis.key == ("worn",)), None)
-    # the axis of worn states is the last one
-    states = (study,) if axis is None else study.variants[: len(axis.values)]
-    values = np.array([scene_set.worn_depth(state, facts[0]) for state in states])
-    dimensions, values = (("contact",), values[0]) if axis is None else ((axis.name, "contact"), values)
-    yield SmallArray("worn_depth", dimensions, values, WORN_DEPTH)
+    if study.scene.worn is not None and len(facts) == 1:
+        axes = [axis.name for axis in study.scene_axes if axis.key == ("worn",)]
+        names, values = points.along([scene_set.worn_depth(each, facts[0]) for each in points.studies], keep=axes)
+        yield SmallArray("worn_depth", (*names, "contact"), values, WORN_DEPTH)
 
 
 def sample_coordinates(study: Study, facts: Sequence[SceneFacts], scenes: scene_set.SceneSet) -> Iterator[SmallArray]:
