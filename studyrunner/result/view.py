@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from solver.outcome import COMPLETE, SENSITIVE_ERROR, Outcome
 from studyrunner.coordinates import POINT
-from studyrunner.result.opening import as_history, open_known, study_tables
+from studyrunner.result.opening import ENDED, as_history, open_known, study_tables
 from studyrunner.statistics.study_statistics import statistics_of_file
 from studyrunner.units import show_cycles, show_value
 from studyrunner.user_error import UserError
@@ -72,8 +72,8 @@ class Result:
     @cached_property
     def designed(self) -> list[str]:
         """Columns that differ between the points of a design; none where the points are combinations of the axes."""
-        arrays = self.dataset.coords.items()
-        found = [(str(name), array.values) for name, array in arrays if array.dims == (POINT,) and name != POINT]
+        arrays = self.dataset.drop_vars([POINT, ENDED], errors="ignore").coords.items()
+        found = [(str(name), array.values) for name, array in arrays if array.dims == (POINT,)]
         return [name for name, values in found if (values != values[0]).any()]
 
     @cached_property

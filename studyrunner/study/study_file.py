@@ -32,6 +32,9 @@ _IDLE_FREQUENCY = 1.0  # Hz, where no point has a frequency of the axis
 _INSTEAD = {"axes.frequency": "frequency_ratio", "axes.frequency_ratio": "frequency"}
 """Keys that stand in each other's place."""
 
+_NO_COLUMNS = ("model", "worn", "mode", "modal_amplitude")
+"""Names that no column of a design has: each point has whole modes, over their amplitude."""
+
 _ON_REQUEST = ("scatter", "loading")
 
 
@@ -309,9 +312,9 @@ def _with_design(given: Mapping[str, object], design: Design | None) -> scene_ax
     if design is None:
         return table
     for column in design.columns.values():
-        is_instead = _INSTEAD.get(f"axes.{column.key}") in design.columns
-        if is_instead or column.key in ("model", "worn") or not _set_key(table, f"axes.{column.key}", column.values):
-            remedy = "leave it out: a column is named as an axis, and frequency stands alone or as frequency_ratio"
+        is_twice = _INSTEAD.get(f"axes.{column.key}") in design.columns
+        if is_twice or column.key in _NO_COLUMNS or not _set_key(table, f"axes.{column.key}", column.values):
+            remedy = "leave it out: give it in the study, and of frequency and frequency_ratio one"
             raise UserError(design.source, f"column {column.key}", None, remedy)
         first, *inner = column.key.split(".")
         for name in ("scene", "wear") if inner else ():
