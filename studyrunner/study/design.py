@@ -12,7 +12,6 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from studyrunner.coordinates import POINT
 from studyrunner.study.text import result_errors
 from studyrunner.system.progress import count
 from studyrunner.user_error import UserError
@@ -79,20 +78,20 @@ class Design:
         for column in self.columns.values():
             own, whole = f"axes.{column.key}.", f"{error.key}."
             if whole.startswith(own) or own.startswith(whole):
-                places = [place for place, value in enumerate(column.values) if _same(value, error.value)]
-                if not places:
+                alike = (isinstance(each, bool) == isinstance(error.value, bool) for each in column.values)
+                pairs = zip(alike, column.values, strict=True)
+                place = next(
+                    (place for place, (same, value) in enumerate(pairs) if same and value == error.value), None
+                )
+                if place is None:
                     return UserError(self.source, f"column {column.key}", None, error.remedy)
-                return self.error(int(np.argmax(column.codes == places[0])), column.key, error.value, error.remedy)
+                return self.error(int(np.argmax(column.codes == place)), column.key, error.value, error.remedy)
         return error
 
     def error(self, row: int, name: str, value: object, remedy: str) -> UserError:
         """What is wrong in a row, counted from 0, of a column."""
         called, first = self.rows_are
         return UserError(self.source, f"{called} {row + first}, column {name}", value, remedy)
-
-
-def _same(one: object, other: object) -> bool:
-    return type(one) is type(other) and one == other
 
 
 def read_design(points: object) -> Design:
@@ -106,7 +105,7 @@ def read_design(points: object) -> Design:
     if isinstance(points, tuple) and len(points) == 2:
         matrix, names = np.atleast_2d(np.asarray(points[0], dtype=object)), list(points[1])
         if matrix.ndim != 2 or matrix.shape[1] != len(names):
-            raise UserError(POINT + "s", "names", names, f"give a name for each of {matrix.shape[-1]} columns")
+            raise UserError("points", "names", names, f"give a name for each of {matrix.shape[-1]} columns")
         return make_design("points", names, matrix.T.tolist(), ("row", 0))
     try:
         table: Any = points
