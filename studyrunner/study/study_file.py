@@ -165,11 +165,11 @@ def _check_study(table: Mapping[str, object], origin: Origin, design: Design | N
                 own = {"scene": find_scene(scene, origin, known), "wear": checked["wear"]}
                 study = Study.model_construct(**{**given_tables, **fixed, **own})
                 raise_wrong(source, broken_rules(study, first=not studies))
-                study = study.model_copy(update={"scene_axes": ()})
+                study = study.model_copy(update={"scene_axes": (), "design": None})
                 studies.append(_complete(_with_block_studies(study, given["scene"], origin)))
     study = studies[0]
-    if found := (*scene_axes.as_checked(axes, study), *worn_axis):
-        study = study.model_copy(update={"scene_axes": found, "variants": tuple(studies)})
+    if (found := (*scene_axes.as_checked(axes, study), *worn_axis)) or design is not None:
+        study = study.model_copy(update={"scene_axes": found, "variants": tuple(studies), "design": design})
     return study
 
 

@@ -192,8 +192,8 @@ def test_mistakes_name_row_and_column(content, key, remedy, folder, capsys):
     [
         ("missing.csv", "the file"),
         (3.0, "type"),
-        ((np.zeros((2, 2)), ["frequency"]), "names"),
-        ({"frequency": [1.0, 2.0], "damping": [1.0]}, "points"),
+        ((np.zeros((2, 2)), ["frequency"]), "columns"),
+        ({"frequency": [1.0, 2.0], "damping": [1.0]}, "columns"),
         ({"frequency": [100.0, None]}, "row 1, column frequency"),
         ({"frequency": [100.0], "friction_coefficient": [-0.1]}, "row 0, column friction_coefficient"),
         ({"step": [1.0]}, "axes.step"),
