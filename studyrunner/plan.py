@@ -61,17 +61,14 @@ def effort_of(works: Iterable[Work]) -> Effort:
         n_of[work.way] += work.n_tasks
         n_results[work.way] += work.n_results
         if work.way in ("sweep", "ramp"):
-            starts[len(starts)] = work.longest
+            starts[len(starts)] = work.longest  # in the order of their numbers
         longest = max(longest, work.longest + (0.0 if work.start is None else starts.get(work.start, 0.0)))
     by = " and ".join(count(n_of[way], way) for way in ("sweep", "ramp") if n_of[way])
-    n_starts, modes = (
-        n_results["sweep"] + n_results["ramp"],
-        f"{count(n_of['mode'], 'nonlinear mode')} over the amplitude",
-    )
+    n_starts, modes = n_results["sweep"] + n_results["ramp"], count(n_of["mode"], "nonlinear mode")
     parts = {
         f"{count(n_starts, 'start state')} by {by}": n_starts,
         count(n_results["history"], "wear history", "wear histories"): n_results["history"],
-        f"{modes}, {count(n_results['mode'], 'point')}": n_results["mode"],
+        f"{modes} over the amplitude, {count(n_results['mode'], 'point')}": n_results["mode"],
         f"{count(n_of['mission'], 'mission history', 'mission histories')}, each computed by one rank": n_of["mission"],
     }
     words = ", and ".join(text for text, number in parts.items() if number)

@@ -43,10 +43,9 @@ def small_arrays(
     study: Study, scenes: scene_set.SceneSet, facts: Sequence[SceneFacts], of_scene: Sequence[SmallArray] = ()
 ) -> list[SmallArray]:
     """Coordinates of the file, and its variables that no task computes. of_scene: what the study asks of the scene."""
-    points, ratio = scenes.points, "frequency_ratio"
-    hertz = []
+    points, hertz = scenes.points, []
     if study.axes.frequency_ratio is not None:
-        along = ratio if ratio in points.dims else POINT
+        along = "frequency_ratio" if "frequency_ratio" in points.dims else POINT
         hertz = [points.array(scene_set.frequencies(study, scenes, facts), keep=(along,))]
     return [
         *(SmallArray("frequency", *each, COORDINATES["frequency"]) for each in hertz),

@@ -223,7 +223,7 @@ def _known_variables(dataset: xr.Dataset) -> dict[str, tuple[tuple[str, ...], Va
         along = tuple(axis for axis in axes if axis in variable.dims)
         if name in dataset.dims:
             known[name] = (name,), None
-        elif name.startswith(DRAWN) or name == "frequency":
+        elif name.startswith(DRAWN) or (name == "frequency" and along):
             known[name] = (*along, *(each for each in ("contact",) if each in variable.dims)), _DRAWN_VALUES
             is_along = {SAMPLE, "frequency_ratio", POINT} & set(along)
             _need(is_along, name, f"dimensions {', '.join(map(str, variable.dims))}")
