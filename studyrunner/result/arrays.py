@@ -88,7 +88,8 @@ def coordinates(study: Study, of_scenes: Sequence[SceneFacts], scenes: scene_set
 
 def _of_pairs(facts: Sequence[SceneFacts], scenes: scene_set.SceneSet) -> Iterator[SmallArray]:
     """Where the pairs are, along the axes along which scenes differ in them; NaN and "" of a pair that one lacks."""
-    names, numbers = scenes.points.array(scenes.differing([each.pairs for each in facts]))
+    same = {each.pairs: np.array(number) for number, each in enumerate(facts)}
+    names, numbers = scenes.along_axes([same[each.pairs] for each in facts])
     contacts = [each.contact for each in facts]
     shape = (len(facts), max(each.n_contact for each in contacts))
     position, area = np.full((*shape, 3), np.nan), np.full(shape, np.nan)

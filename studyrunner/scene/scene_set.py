@@ -35,14 +35,10 @@ class SceneSet:
     points: Points
     of_blocks: tuple[tuple[int, ...], ...]
 
-    def differing(self, keys: Sequence[Hashable]) -> Column:
-        """The column of numbers of scenes that differ in their keys; of a mission those of the first block."""
-        first: dict[Hashable, int] = {}
-        alike = [first.setdefault(key, number) for number, key in enumerate(keys)]
-        return self.points.of_studies([alike[numbers[0]] for numbers in self.of_blocks])
-
     def along_axes(self, values: Sequence[NDArray[Any]]) -> tuple[tuple[str, ...], NDArray[Any]]:
-        """Axes along which arrays of the scenes differ, and these arrays along the axes. values: of each, alike."""
+        """Axes along which arrays of the scenes differ, and these arrays along the axes; of missions those of the first
+        block. values: of each scene, alike.
+        """
         return self.points.along([values[numbers[0]] for numbers in self.of_blocks])
 
 
