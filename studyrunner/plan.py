@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from studyrunner.kinds import missions, modes, wear_plan
 from studyrunner.kinds.estimate import AUTOMATIC_HARMONICS, COMPILE_SECONDS, largest_memory, memory_a_rank
-from studyrunner.kinds.task import TaskPlan, Work, make_table
+from studyrunner.kinds.task import TaskPlan, Work, with_tasks
 from studyrunner.scene.answers import remarks_of_study
 from studyrunner.scene.scene import SceneFacts, values_of_point
 from studyrunner.scene.scene_set import SceneSet, contact_changes, merge_facts, plan_scenes
@@ -35,7 +35,8 @@ def build_tasks(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]) -> 
     """
     builders = {MISSIONS.name: missions.build_tasks, MODES.name: modes.build_tasks}
     build = builders.get(study.kind.name, wear_plan.build_tasks)
-    return build(study, make_table(study, scenes, facts, contact_changes(study, scenes, facts)))
+    points = with_tasks(study, scenes, facts, contact_changes(study, scenes, facts))
+    return build(study, points, [each.n_displacements for each in facts])
 
 
 class Effort(NamedTuple):

@@ -13,6 +13,7 @@ from solver.settings import Direction, Passage, WearTarget
 from studyrunner.kinds import task as tasks
 from studyrunner.kinds.estimate import iterations_of_missions, missions_computed, seconds_of
 from studyrunner.kinds.results import mission_values
+from studyrunner.points.table import Points
 from studyrunner.study.study import Study
 
 _NO_JOINT = tasks.TaskJoint(0, None)
@@ -83,19 +84,17 @@ class Mission(tasks.Task):
         return f"mission history {self.number + 1}"
 
 
-def build_tasks(study: Study, table: tasks.Table) -> tasks.TaskPlan:
+def build_tasks(study: Study, points: Points, n_displacements: Sequence[int]) -> tasks.TaskPlan:
     """Tasks of a study of missions, one for equal points."""
     found: dict[Mission, list[int]] = {}
     # of the axes their places: blocks may have values of their own
-    own = [table.points.columns[name] for name in ("study", "frequency", "excitation_amplitude", "sweep")]
-    wear = table.points.axis("wear_coefficient")
-    for (joints, law, settings, wear_coefficient, number, *at), numbers in table.grouped(
-        *(table.columns[name] for name in ("joint", "law", "settings")), wear, *own
-    ):
-        part = table.points.studies[number]
+    places = [points.columns[name] for name in ("study", "frequency", "excitation_amplitude", "sweep")]
+    own = [*(points.columns[name] for name in ("joint", "law", "settings")), points.axis("wear_coefficient")]
+    for (joints, law, settings, wear_coefficient, number, *at), numbers in points.groups(*own, *places):
+        part = points.studies[number]
         blocks, sweep = tuple(_blocks(part, joints, *at)), part.axes.sweep[at[-1]]
         scenes = tuple(sorted({joint.scene for joint in joints}))
-        n_unknowns = tasks.n_unknowns_of(max(table.n_displacements[scene] for scene in scenes), settings.harmonics)
+        n_unknowns = tasks.n_unknowns_of(max(n_displacements[scene] for scene in scenes), settings.harmonics)
         ways = [(block.begin, block.frequency) for block in blocks]
         task = Mission(
             number=0,
@@ -112,7 +111,7 @@ def build_tasks(study: Study, table: tasks.Table) -> tasks.TaskPlan:
             until=study.until,
         )
         found.setdefault(task, []).extend(numbers)
-    return tasks.number_points({task: [numbers] for task, numbers in found.items()}, table.points.n)
+    return tasks.number_points({task: [numbers] for task, numbers in found.items()}, points.n)
 
 
 def _blocks(

@@ -1,6 +1,6 @@
 """Nonlinear modes: tasks and their computation."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, cast
 
@@ -10,6 +10,7 @@ from solver.model import ReducedModel
 from studyrunner.kinds import task as tasks
 from studyrunner.kinds.estimate import iterations_of_mode, seconds_of
 from studyrunner.kinds.results import first_harmonic, named
+from studyrunner.points.table import Points
 from studyrunner.study.study import Study
 from studyrunner.variables import OF_A_MODE_POINT
 
@@ -59,15 +60,15 @@ class Mode(tasks.Task):
         return f"mode {self.mode} {self.direction} to {self.amplitudes[place]:.3g} m sqrt(kg)"
 
 
-def build_tasks(study: Study, table: tasks.Table) -> tasks.TaskPlan:
+def build_tasks(study: Study, points: Points, n_displacements: Sequence[int]) -> tasks.TaskPlan:
     """Tasks of a study of nonlinear modes: one along the amplitude for each joint, mode, direction and setting."""
     modes: dict[tuple[Any, ...], dict[float, list[int]]] = {}
-    columns = (table.columns["joint"], *map(table.points.axis, ("mode", "sweep")), table.columns["settings"])
-    for (*own, amplitude), numbers in table.grouped(*columns, table.points.axis("modal_amplitude")):
+    columns = (points.columns["joint"], *map(points.axis, ("mode", "sweep")), points.columns["settings"])
+    for (*own, amplitude), numbers in points.groups(*columns, points.axis("modal_amplitude")):
         modes.setdefault(tuple(own), {})[amplitude] = numbers
     found: dict[Mode, list[list[int]]] = {}
     for ((joint,), mode, direction, settings), amplitudes in modes.items():
-        n_unknowns = tasks.n_unknowns_of(table.n_displacements[joint.scene], settings.harmonics)
+        n_unknowns = tasks.n_unknowns_of(n_displacements[joint.scene], settings.harmonics)
         first, whole = (iterations_of_mode(number) for number in (1, len(amplitudes)))
         task = Mode(
             number=0,
@@ -83,4 +84,4 @@ def build_tasks(study: Study, table: tasks.Table) -> tasks.TaskPlan:
             variables=tuple(study.recorded),
         )
         found[task] = [amplitudes[amplitude] for amplitude in task.amplitudes]
-    return tasks.number_points(found, table.points.n)
+    return tasks.number_points(found, points.n)

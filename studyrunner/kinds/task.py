@@ -19,7 +19,7 @@ from solver.packing import Packed, unpack
 from solver.settings import Automatic, SolverSettings
 from studyrunner.kinds.estimate import AUTOMATIC_HARMONICS
 from studyrunner.mpi.dispatch import CostKeys
-from studyrunner.points.table import Column, Points
+from studyrunner.points.table import Points
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.scene_set import ContactChange, SceneSet, frequencies
 from studyrunner.study.sections import AUTO, SOLVER_AXES
@@ -304,29 +304,13 @@ def number_points(tasks: Mapping[Any, Sequence[Sequence[int]]], n_points: int) -
 # --- from a study to its tasks ---
 
 
-@dataclass(frozen=True)
-class Table:
-    """The points of a study, and what tasks are made of.
-
-    columns: "joint", a joint for each block; "law"; "settings"; "frequency" in Hz. n_displacements: of each scene.
-    """
-
-    points: Points
-    columns: Mapping[str, Column]
-    n_displacements: Sequence[int]
-
-    def grouped(self, *columns: Column) -> Iterator[tuple[tuple[Any, ...], list[int]]]:
-        """Combinations of values of columns, as they come first, each with the numbers of its points."""
-        codes, combinations = self.points.walked(*columns)
-        numbers = self.points.numbers[np.argsort(codes, kind="stable")]
-        for each, alike in zip(combinations, np.split(numbers, np.cumsum(np.bincount(codes))[:-1]), strict=True):
-            yield each, alike.tolist()
-
-
-def make_table(
+def with_tasks(
     study: Study, scenes: SceneSet, facts: Sequence[SceneFacts], contacts: Sequence[Sequence[ContactChange]]
-) -> Table:
-    """The table of a study. facts: of each scene. contacts: what differs in the pairs of each study, by block."""
+) -> Points:
+    """The points with what tasks are made of: "joint", a joint for each block, "law", "settings" and "hertz".
+
+    facts: of each scene. contacts: what differs in the pairs of each study, by block.
+    """
     points, limit = scenes.points, math.inf if study.solver.time_limit is None else study.solver.time_limit
     parts = zip(points.studies, scenes.of_blocks, contacts, strict=True)
     joints = [
@@ -340,9 +324,9 @@ def make_table(
         "joint": points.of_studies(joints),
         "law": points.of_studies([own.wear.as_law for own in points.studies]),
         "settings": points.combined(settings, *map(points.axis, SOLVER_AXES)),
-        "frequency": frequencies(study, scenes, facts),
+        "hertz": frequencies(study, scenes, facts),
     }
-    return Table(points, columns, [each.n_displacements for each in facts])
+    return replace(points, columns={**points.columns, **columns})
 
 
 def up_or_down(n_places: int, direction: str) -> tuple[int, ...]:

@@ -18,8 +18,9 @@ from numpy.typing import NDArray
 from solver.contact.wear_law import WearLaw
 from solver.settings import ToTheEnd
 from studyrunner.kinds.estimate import iterations_of_histories, iterations_of_sweep, seconds_of
-from studyrunner.kinds.task import EQUAL_POINTS, Table, TaskPlan, Work, n_unknowns_of
+from studyrunner.kinds.task import EQUAL_POINTS, TaskPlan, Work, n_unknowns_of
 from studyrunner.kinds.wear import Excitation, History, Integrated, Sweep
+from studyrunner.points.table import Points
 from studyrunner.study.study import Study
 from studyrunner.variables import OWN_STEPS
 
@@ -84,7 +85,7 @@ def _begins(*columns: NDArray[Any]) -> NDArray[np.intp]:
     return np.flatnonzero(np.any([np.append(True, each[1:] != each[:-1]) for each in columns], axis=0))
 
 
-def build_tasks(study: Study, table: Table) -> TaskPlan:
+def build_tasks(study: Study, points: Points, n_displacements: Sequence[int]) -> TaskPlan:
     """Tasks of a study of wear.
 
     Points whose history is the same for a reason that the study itself shows share a task. Points with a solution of
@@ -98,7 +99,7 @@ def build_tasks(study: Study, table: Table) -> TaskPlan:
         "to_the_end": ToTheEnd(len(study.output_counts), study.slow_time.final_share) if study.to_the_end else None,
     }
     sharing: _Sharing = lru_cache(_MOST_KNOWN)(partial(_share_histories, study))
-    sweeps, groups = _find_starts(study, table)
+    sweeps, groups = _find_starts(study, points, n_displacements)
     causes = Counter[str]()
     for group in groups():
         causes.update(sharing(group.values)[1])
@@ -112,16 +113,18 @@ def build_tasks(study: Study, table: Table) -> TaskPlan:
             yield Work("history", len(tasks), n_integrated, n_unknowns, sum(costs), max(costs), sweep.number)
 
     make = partial(_make_histories, groups, sharing, outputs)
-    return TaskPlan(make, works, left_out, table.points.n, tuple(sweeps))
+    return TaskPlan(make, works, left_out, points.n, tuple(sweeps))
 
 
-def _find_starts(study: Study, table: Table) -> tuple[list[Sweep], Callable[[], Iterator[_Group]]]:
+def _find_starts(
+    study: Study, points: Points, n_displacements: Sequence[int]
+) -> tuple[list[Sweep], Callable[[], Iterator[_Group]]]:
     """The sweeps of a study, and the points that begin from their states, made anew each time: there may be many."""
-    points, columns = table.points, table.columns
+    columns = points.columns
     own = columns["joint"], points.axis("excitation_amplitude"), points.axis("sweep"), columns["settings"]
     (case, cases), (line, lines) = points.walked(*own), points.walked(*own, columns["law"])
     kind, kinds = points.walked(*map(points.axis, ("wear_coefficient", "step", "scheme")))
-    places, frequencies = points.walked(columns["frequency"])
+    places, frequencies = points.walked(columns["hertz"])
     frequency = np.array(frequencies)[places, 0]
     order = np.lexsort((line, frequency, case))
     case, line, frequency = case[order], line[order], frequency[order]
@@ -129,7 +132,7 @@ def _find_starts(study: Study, table: Table) -> tuple[list[Sweep], Callable[[], 
     sweeps, of_start = list[Sweep](), list[tuple[Sweep, int]]()
     for begin, end in itertools.pairwise([*_begins(case[first]).tolist(), len(first)]):
         (joint,), amplitude, direction, settings = cases[case[first[begin]]]
-        n_unknowns = n_unknowns_of(table.n_displacements[joint.scene], settings.harmonics)
+        n_unknowns = n_unknowns_of(n_displacements[joint.scene], settings.harmonics)
         length = 1 if direction == "ramp" else end - begin
         one, whole = (iterations_of_sweep(direction, number) for number in (1, length))
         for place in range(begin, end, length):

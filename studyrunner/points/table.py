@@ -1,7 +1,7 @@
 """The table of points: the only walk through axes, rows of a design, and samples; tasks are groups of its points."""
 
 import math
-from collections.abc import Callable, Hashable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -134,6 +134,13 @@ class Points:
         rank = np.empty(len(order), np.intp)
         rank[order] = np.arange(len(order))
         return rank[codes], [combinations[place] for place in order.tolist()]
+
+    def groups(self, *columns: Column) -> Iterator[tuple[tuple[Any, ...], list[int]]]:
+        """Combinations of values of columns, as they come first, each with the numbers of its points."""
+        codes, combinations = self.walked(*columns)
+        numbers = self.numbers[np.argsort(codes, kind="stable")]
+        for each, alike in zip(combinations, np.split(numbers, np.cumsum(np.bincount(codes))[:-1]), strict=True):
+            yield each, alike.tolist()
 
 
 def points_of(study: Study) -> Points:
