@@ -260,7 +260,7 @@ class Result:
         if self.has("cycle_count"):
             has_slow_time = np.isfinite(self.of_points("cycle_count", -1))
         wanted = everywhere
-        for name in set(self.chosen) & set(self.varying):
+        for name in set(self.chosen) & {*self.varying, *self.designed}:
             wanted = wanted & (self.of_points(name) == self.chosen[name])
         best = self.best_known
         sets = (best & has_slow_time, self.usable & has_slow_time, best, self.computed, self.has_values, everywhere)
@@ -307,7 +307,8 @@ def open_for_report(path: Path | str, chosen: Mapping[str, str] | None = None) -
 
 def _find_value(dataset: xr.Dataset, name: str, text: str) -> float | str:
     """The value of an axis as it is in a file, from its text on the command line."""
-    axes = [str(axis) for axis in dataset["outcome"].dims]
+    columns = [name for name, array in dataset.coords.items() if array.dims == (POINT,) and name != POINT]
+    axes = [str(axis) for axis in (*dataset["outcome"].dims, *columns)]
     remedy = f"give one of the axes {', '.join(axes)}"
     if name in axes:
         values = dataset[name].values.tolist()

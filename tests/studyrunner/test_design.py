@@ -227,6 +227,7 @@ def test_the_report_shows_each_point_of_a_design(folder, capsys):
     page = Path("out-report/index.html").read_text("utf-8")
     assert "Points of the design" in page
     assert Path("out-report/trends.csv").read_text("utf-8").count("\n") > 12
-    assert open_for_report("out.nc").designed == ["frequency", "damping", "scheme"]
+    chosen = open_for_report("out.nc", {"damping": "2"})
+    assert (chosen.designed, chosen.shown["point"]) == (["frequency", "damping", "scheme"], 1)
     loops = compute_worn_joint("out.nc", "worn", loops=[0], progress=False)["loops"]
     assert float(loops.loop_force.max()) > 0.0
