@@ -69,10 +69,11 @@ class Design:
         try:
             yield
         except UserError as error:
-            first, *others = (self._located(each) for each in error.mistakes)
+            first, *others = (self.located(each) for each in error.mistakes)
             raise UserError(first.place, first.key, first.value, first.remedy, tuple(others)) from None
 
-    def _located(self, error: UserError) -> UserError:
+    def located(self, error: UserError) -> UserError:
+        """The same, with file, row and column where it is about a value of a column."""
         for column in self.columns.values():
             own, whole = f"axes.{column.key}.", f"{error.key}."
             if whole.startswith(own) or own.startswith(whole):

@@ -316,6 +316,10 @@ def _with_design(given: Mapping[str, object], design: Design | None) -> scene_ax
         if is_twice or column.key in _NO_COLUMNS or not _set_key(table, f"axes.{column.key}", column.values):
             remedy = "leave it out: give it in the study, and of frequency and frequency_ratio one"
             raise UserError(design.source, f"column {column.key}", None, remedy)
+        words = [value for value in column.values if isinstance(value, str)]
+        if words and column.key == "frequency":
+            remedy = "give Hz: what follows a resonance stands under [axes] of the study, for all points"
+            raise design.located(UserError(design.source, "axes.frequency", words[0], remedy))
         first, *inner = column.key.split(".")
         for name in ("scene", "wear") if inner else ():
             own = scene_axes.only_table(cast("Any", table.get(name, {})).get(first))

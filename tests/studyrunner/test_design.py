@@ -159,7 +159,8 @@ def test_more_points_are_computed_alone(folder, solver):
     ("content", "key", "remedy"),
     [
         ("frequncy\n150\n", "column frequncy", "frequency"),
-        ("frequency\n150\nabc\n", "row 3, column frequency", "number"),
+        ("frequency\n150\nabc\n", "row 3, column frequency", "Hz"),
+        ("damping\nabc\n", "row 2, column damping", "number"),
         ("frequency,damping\n150,0\n151,-3\n", "row 3, column damping", "0 or more"),
         ("frequency\n150\n-3\n", "row 3, column frequency", "above 0"),
         ("frequency\nnan\n", "row 2, column frequency", "finite"),
