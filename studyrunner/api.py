@@ -27,6 +27,7 @@ def run_study(
     output: str | Path | None = None,
     *,
     overrides: Sequence[str] | Mapping[str, object] = (),
+    points: object = None,
     fresh: bool = False,
     overwrite: bool = False,
     retry_failed: bool = False,
@@ -38,7 +39,8 @@ def run_study(
 
     - study: as `read_study` gives it, or what it reads: a path, or the name of a bundled study.
     - output: the result file; `<name of the study>.nc` in the current folder if not given.
-    - overrides: as in `read_study`, where the study is not read yet.
+    - overrides, points: as in `read_study`, where the study is not read yet. Of more points with the same output only
+      those are computed that are new.
     - fresh: start over: forget what an earlier run of this study has left.
     - overwrite: replace a result that is of another study: one of another name or of another scene.
     - retry_failed: compute points that failed in an earlier run once more.
@@ -56,9 +58,10 @@ def run_study(
         remedy = "call it in one process, or give `mpiexec run-study`: here each process would compute all of it"
         raise UserError("run_study", "processes", announced, remedy)
     if not isinstance(study, Study):
-        study = read_study(study, overrides)
-    elif overrides:
-        raise UserError("run_study", "overrides", None, "give them to read_study: this study is read already")
+        study = read_study(study, overrides, points)
+    elif overrides or points is not None:
+        key = "overrides" if overrides else "points"
+        raise UserError("run_study", key, None, "give them to read_study: this study is read already")
     checked = None if date is None else check_date(date, "run_study", "date")
     path = Path(f"{study.study.name}.nc" if output is None else output)
     try:

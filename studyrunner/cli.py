@@ -150,7 +150,7 @@ def _lead(ranks: Ranks, arguments: Sequence[str]) -> int:
         process.raise_ending()
         from studyrunner.study.study_file import read_study
 
-        study = read_study(options.study, options.overrides)
+        study = read_study(options.study, options.overrides, options.points)
         process.raise_ending()
         if options.plan or options.check or options.write_scene is not None:
             return _describe(study, options)
@@ -173,7 +173,12 @@ def _describe(study: "Study", options: argparse.Namespace) -> int:
 
     step = ProgressDisplay().step
     if options.plan:
-        print(*plan_lines(study, step), sep="\n", flush=True)
+        if options.csv:
+            from studyrunner.plan_table import print_table
+
+            print_table(study, step, sys.stdout)
+        else:
+            print(*plan_lines(study, step), sep="\n", flush=True)
         error = process.last_error(sys.stdout)
         if error is not None and not isinstance(error, BrokenPipeError):  # a reader that has gone has seen enough
             raise UserError("command line", "--plan", None, f"cannot be written to stdout: {error.strerror}")
@@ -234,7 +239,10 @@ def _parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     add("--version", action="version", version=version, help="print the version")
     add("--new", metavar="NAME", help="write NAME.toml, a study to start from, and stop")
     add("--from", dest="deck", metavar="DECK", help="with --new: a study of this deck or mesh", **path)
+    rows = "points to compute: a header with names of axes, and a row a point"
+    add("--points", metavar="DESIGN.csv", help=rows)
     add("--plan", help="print what would be computed; compute nothing", **flag)
+    add("--csv", help="with --plan: each point with its task, scene and estimated time, as a table", **flag)
     add("--check", help="print what a finite-element model is, draw its contact pairs; then stop", **flag)
     changed = "override a key of the study by its dotted name; VALUE is TOML or a bare word; may be repeated"
     add("--set", dest="overrides", action="append", default=[], metavar="KEY=VALUE", help=changed)
@@ -249,6 +257,8 @@ def _parse_options(arguments: Sequence[str]) -> argparse.Namespace:
     if found.deck is not None and found.new is None:
         remedy = "give --new NAME beside it: the name of the new study"
         raise UserError("command line", "--from", str(found.deck), remedy)
+    if found.csv and not found.plan:
+        raise UserError("command line", "--csv", None, "give --plan beside it: it prints the points of a plan")
     # below: imported where it is used, as it takes a second to load
     if found.new is not None:
         from studyrunner.study.keys import write_new_study

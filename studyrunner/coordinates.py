@@ -2,6 +2,9 @@
 
 from studyrunner.variables import Variable
 
+POINT, SAMPLE = "point", "sample"
+"""Dimensions of points that are rows of a table, and of drawn values."""
+
 _AUXILIARY, _REFERENCE = "auxiliaryInformation", "referenceInformation"
 _UNPLACED = "NaN where the scene does not say."
 _NO_FORM = "NaN where no closed form holds."
@@ -80,7 +83,8 @@ COORDINATES = {
     "tolerance": Variable((), "1", "largest accepted scaled residual"),
     "rtol": Variable((), "1", "relative error that automatic settings and adaptive steps aim at"),
     "modal_amplitude": Variable((), "m kg^0.5", "modal amplitude", "sqrt(x^H M x), x: first harmonic, M: mass matrix."),
-    "sample": Variable((), "1", "number of the sample", "What it draws is in the coordinates sample_..."),
+    POINT: Variable((), "1", "number of the point", "A row of the design, from 0; its values are coordinates."),
+    SAMPLE: Variable((), "1", "number of the sample", "What it draws is in the coordinates sample_..."),
     "cycle": Variable((), "1", "number of vibration cycles", "Slow time."),
     "mission": Variable((), "1", "number of missions", "Slow time."),
     "block": Variable((), "1", "name of the block of the mission", "In their order in a mission."),

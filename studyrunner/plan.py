@@ -9,10 +9,7 @@ from typing import NamedTuple
 
 from studyrunner.kinds import missions, modes, wear_plan
 from studyrunner.kinds.estimate import AUTOMATIC_HARMONICS, COMPILE_SECONDS, largest_memory, memory_a_rank
-from studyrunner.kinds.missions import Mission
-from studyrunner.kinds.modes import Mode
-from studyrunner.kinds.task import Task, TaskPlan
-from studyrunner.kinds.wear import History, Sweep
+from studyrunner.kinds.task import TaskPlan, Work, with_tasks
 from studyrunner.scene.answers import remarks_of_study
 from studyrunner.scene.scene import SceneFacts, values_of_point
 from studyrunner.scene.scene_set import SceneSet, contact_changes, merge_facts, plan_scenes
@@ -38,7 +35,8 @@ def build_tasks(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]) -> 
     """
     builders = {MISSIONS.name: missions.build_tasks, MODES.name: modes.build_tasks}
     build = builders.get(study.kind.name, wear_plan.build_tasks)
-    return build(study, scenes, [each.n_displacements for each in facts], contact_changes(study, scenes, facts))
+    points = with_tasks(study, scenes, facts, contact_changes(study, scenes, facts))
+    return build(study, points, [each.n_displacements for each in facts])
 
 
 class Effort(NamedTuple):
@@ -55,28 +53,26 @@ class Effort(NamedTuple):
     longest: float
 
 
-def effort_of(tasks: Iterable[Task]) -> Effort:
-    """In one pass, the sweeps first: the tasks may be made on the way, and there may be a million of them."""
+def effort_of(works: Iterable[Work]) -> Effort:
+    """In one pass, the sweeps first."""
     n_tasks, n_unknowns, seconds, longest = 0, 0, 0.0, 0.0
-    ways, n_results, costs = Counter[str](), Counter[type](), dict[int, float]()
-    for task in tasks:
-        n_tasks, n_unknowns, seconds = n_tasks + 1, max(n_unknowns, task.n_unknowns), seconds + task.cost
-        # of a history those that are integrated
-        n_results[type(task)] += len(task.integrated) if isinstance(task, History) else task.n_results
-        if isinstance(task, Sweep):
-            ways["ramp" if task.excitation.direction == "ramp" else "sweep"] += 1
-            costs[task.number] = task.cost
-        ways["mode"] += isinstance(task, Mode)
-        start = task.waits_for
-        longest = max(longest, task.cost + (0.0 if start is None else costs.get(start[0], 0.0)))
-    by = " and ".join(count(ways[word], word) for word in ("sweep", "ramp") if ways[word])
+    n_of, n_results, starts = Counter[str](), Counter[str](), dict[int, float]()
+    for work in works:
+        n_tasks, n_unknowns, seconds = n_tasks + work.n_tasks, max(n_unknowns, work.n_unknowns), seconds + work.seconds
+        n_of[work.way] += work.n_tasks
+        n_results[work.way] += work.n_results
+        if work.way in ("sweep", "ramp"):
+            starts[len(starts)] = work.longest  # in the order of their numbers
+        longest = max(longest, work.longest + (0.0 if work.start is None else starts.get(work.start, 0.0)))
+    by = " and ".join(count(n_of[way], way) for way in ("sweep", "ramp") if n_of[way])
+    n_starts, modes = n_results["sweep"] + n_results["ramp"], count(n_of["mode"], "nonlinear mode")
     parts = {
-        Sweep: f"{count(n_results[Sweep], 'start state')} by {by}",
-        History: count(n_results[History], "wear history", "wear histories"),
-        Mode: f"{count(ways['mode'], 'nonlinear mode')} over the amplitude, {count(n_results[Mode], 'point')}",
-        Mission: f"{count(n_results[Mission], 'mission history', 'mission histories')}, each computed by one rank",
+        f"{count(n_starts, 'start state')} by {by}": n_starts,
+        count(n_results["history"], "wear history", "wear histories"): n_results["history"],
+        f"{modes} over the amplitude, {count(n_results['mode'], 'point')}": n_results["mode"],
+        f"{count(n_of['mission'], 'mission history', 'mission histories')}, each computed by one rank": n_of["mission"],
     }
-    words = ", and ".join(text for kind, text in parts.items() if n_results[kind])
+    words = ", and ".join(text for text, number in parts.items() if number)
     return Effort(words, n_tasks, n_unknowns, seconds, longest)
 
 
@@ -87,7 +83,7 @@ def plan_lines(study: Study, say: Callable[[str], None]) -> list[str]:
     built_with = largest_memory() - before
     plan, largest = build_tasks(study, scenes, facts), merge_facts(facts)
     seconds = time.process_time() + seconds_left
-    effort = effort_of(itertools.chain(plan.sweeps, plan.results))
+    effort = effort_of(itertools.chain((sweep.work for sweep in plan.sweeps), plan.works()))
     rows = [
         *_of_study(study, facts, plan, effort),
         *_of_effort(study, largest, plan, effort, built_with, seconds),
@@ -164,11 +160,13 @@ def doubts_of_study(study: Study, facts: SceneFacts | None = None) -> tuple[str,
     of_wear = "wear_coefficient" if table is None else "wear_coefficient times wear.factor"
     worn = [depth for part in parts if part.scene.worn for state in part.scene.worn.depth for depth in state]
     gap = [abs(value) for value in _numbers(parts, "gap")]
-    amplitude = [value for part in parts for value in part.axes.excitation_amplitude]
+    # variants have the axes of the study
+    excited = [study, *(block for variant in study.variants or (study,) for block in variant.block_studies)]
+    amplitude = [value for part in excited for value in part.axes.excitation_amplitude]
     friction, speed = _numbers(parts, "friction_coefficient"), _numbers(parts, "rotation_speed")
     lengths, deep = {"mm": 1e-3, "um": 1e-6}, "deeper than joints wear, some hundred um"
     depth, volume = ("m", 0.0, 1e-3, lengths), ("m3", 0.0, 1e-3, {"mm3": 1e-9})
-    stuck, own = 0.0 if facts is None else facts.stuck_frequency, _frequencies(study, parts)
+    stuck, own = 0.0 if facts is None else facts.stuck_frequency, _frequencies(study, excited)
     found = [
         _question(of_wear, wear, ("1/Pa", *_PLAUSIBLE_WEAR, _UNITS_OF_WEAR), "a thousand times off what metals have"),
         # 1600 years at 200 Hz

@@ -23,10 +23,9 @@ from studyrunner.mpi.ranks import Ranks
 from studyrunner.mpi.schedule import TaskHandler, serve_tasks
 from studyrunner.scene import answers
 from studyrunner.scene.scene import SceneFacts, build_study_scene, describe_scene, model_key
-from studyrunner.scene.scene_set import SceneSet, at_ratios, find_scenes
-from studyrunner.study.mistakes import keys_as_given
-from studyrunner.study.scene_axes import keys_below_axes
+from studyrunner.scene.scene_set import SceneSet, find_scenes
 from studyrunner.study.study import Study
+from studyrunner.study.study_file import keys_in_file
 from studyrunner.system.machine import MappedFile, new_partial, write_mapped
 from studyrunner.user_error import UserError
 
@@ -131,7 +130,7 @@ def build_scenes(ranks: Ranks, study: Study, store: Store, say: Progress) -> Sce
     """
     scenes = find_scenes(study)
     building = _Building(scenes, store, say)
-    with keys_as_given(keys_below_axes(study.scene_axes)):
+    with keys_in_file(study):
         if len(scenes.studies) > 1:
             serve_tasks(ranks, building, build_scene_task)
         else:
@@ -143,10 +142,10 @@ def build_scenes(ranks: Ranks, study: Study, store: Store, say: Progress) -> Sce
             if each.error is not None:
                 raise each.error
         facts = tuple(each.facts for each in built if each.facts is not None)
-        variables, notes = answers.join_scene_variables(study, scenes, [each.variables for each in built])
+        variables, notes = answers.join_scene_variables(scenes, [each.variables for each in built])
         stored = answers.scene_to_store(scenes.studies[0], building.read(0)) if len(built) == 1 else None
     models = SceneModels(building.read, store.path)
-    return Scenes(at_ratios(scenes, facts), facts, (*variables, *answers.exact_answers(study)), stored, notes, models)
+    return Scenes(scenes, facts, (*variables, *answers.exact_answers(study)), stored, notes, models)
 
 
 class _Building(TaskHandler):

@@ -94,7 +94,8 @@ def read_axis(value: object) -> tuple[Any, ...]:
         values = Range.model_validate(value).values
         if isinstance(value["start"], int) and isinstance(value["stop"], int):
             values = tuple(int(each) if each == int(each) else each for each in values)
-    if not 0 < len(values) <= LONGEST_AXIS:
+    # the columns of a design are tuples, which no file and no list of an override is
+    if not values or (len(values) > LONGEST_AXIS and not isinstance(value, tuple)):
         raise ValueError(f"give at least one value, and at most {LONGEST_AXIS}")
     for each in values:
         if not isinstance(each, bool | int | float | str):

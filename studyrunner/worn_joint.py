@@ -12,9 +12,10 @@ import numpy as np
 import xarray as xr
 
 from studyrunner.api import run_study
+from studyrunner.points.table import points_of
 from studyrunner.result.pairs import depths, has_depths, pairs_of_scene
 from studyrunner.result.view import NO_VOLUME, Result, open_for_report
-from studyrunner.study.parts import parts_of
+from studyrunner.study.sections import SOLVER_AXES
 from studyrunner.study.study_file import read_study
 from studyrunner.user_error import UserError
 
@@ -104,13 +105,16 @@ def _overrides(result: Result) -> dict[str, Any]:
     if study.scatter is not None and study.scatter.of_pairs:
         remedy = "give a result whose samples draw no value for each pair"
         raise UserError(str(result.path), f"scatter.{study.scatter.of_pairs[0]}", None, remedy)
-    place = tuple(shown[name] for name in study.axes_of_parts)
-    part = next(each.study for each in parts_of(study) if each.place == place)
-    keys: dict[str, Any] = {f"axes.{axis.key[0]}": None for axis in study.scene_axes}
+    points = points_of(study)
+    part = points.studies[points.at(points.columns["study"], shown)]
+    keys: dict[str, Any] = {} if study.design is None else {"points": None}
+    keys |= {f"axes.{axis.key[0]}": None for axis in study.scene_axes}
     # all of them: room for wear is made for the whole history
     keys |= {f"scene.{key}": value for key, value in part.scene.parameters.model_dump(mode="json").items()}
-    for name in study.dimensions.keys() - study.axes_of_parts.keys():
-        keys[f"axes.{name}"] = (getattr(part.axes, name, None) or study.dimensions[name])[shown[name]]
+    for name in (*study.kind.axes, *SOLVER_AXES):
+        keys[f"axes.{name}"] = points.at(points.axis(name), shown)
+    if part.axes.frequency_ratio is not None:
+        keys |= {"axes.frequency": None, "axes.frequency_ratio": keys["axes.frequency"]}
     if result.followed:
         if not result.has("excitation_frequency"):
             remedy = result.lacks("excitation_frequency")

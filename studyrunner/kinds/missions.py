@@ -13,7 +13,7 @@ from solver.settings import Direction, Passage, WearTarget
 from studyrunner.kinds import task as tasks
 from studyrunner.kinds.estimate import iterations_of_missions, missions_computed, seconds_of
 from studyrunner.kinds.results import mission_values
-from studyrunner.scene.scene_set import ContactChange, SceneSet
+from studyrunner.points.table import Points
 from studyrunner.study.study import Study
 
 _NO_JOINT = tasks.TaskJoint(0, None)
@@ -84,46 +84,47 @@ class Mission(tasks.Task):
         return f"mission history {self.number + 1}"
 
 
-def build_tasks(
-    study: Study, scenes: SceneSet, n_displacements: Sequence[int], contacts: Sequence[Sequence[ContactChange]]
-) -> tasks.TaskPlan:
-    """Tasks of a study of missions, one for equal points. contacts: drawn for the pairs of each part, by block."""
-    points: dict[Mission, list[tasks.Index]] = {}
-    for part, numbers, of_blocks in zip(scenes.parts, scenes.of_blocks, contacts, strict=True):
-        for at, settings in tasks.grid(part.study):
-            blocks = tuple(_blocks(part.study, at, numbers, of_blocks))
-            n_unknowns = tasks.n_unknowns_of(max(n_displacements[number] for number in numbers), settings.harmonics)
-            ways = [(block.begin, block.frequency) for block in blocks]
-            task = Mission(
-                number=0,
-                scenes=tuple(sorted(set(numbers))),
-                settings=settings,
-                cost=seconds_of(n_unknowns, iterations_of_missions(ways, study.output_counts[-1])),
-                n_unknowns=n_unknowns,
-                blocks=blocks,
-                law=part.study.wear.as_law,
-                wear_coefficient=part.study.axes.wear_coefficient[at["wear_coefficient"]],
-                first=part.study.axes.sweep[at["sweep"]] if blocks[0].begin == "continue" else "",
-                missions=study.output_counts,
-                variables=tuple(study.recorded),
-                until=study.until,
-            )
-            points.setdefault(task, []).append((*(at[name] for name in study.own_axes), *part.place))
-    return tasks.number_points({task: [tuple(indices)] for task, indices in points.items()}, study)
+def build_tasks(study: Study, points: Points, n_displacements: Sequence[int]) -> tasks.TaskPlan:
+    """Tasks of a study of missions, one for equal points."""
+    found: dict[Mission, list[int]] = {}
+    # of the axes their places: blocks may have values of their own
+    places = [points.columns[name] for name in ("study", "frequency", "excitation_amplitude", "sweep")]
+    own = [*(points.columns[name] for name in ("joint", "law", "settings")), points.axis("wear_coefficient")]
+    for (joints, law, settings, wear_coefficient, number, *at), numbers in points.groups(*own, *places):
+        part = points.studies[number]
+        blocks, sweep = tuple(_blocks(part, joints, *at)), part.axes.sweep[at[-1]]
+        scenes = tuple(sorted({joint.scene for joint in joints}))
+        n_unknowns = tasks.n_unknowns_of(max(n_displacements[scene] for scene in scenes), settings.harmonics)
+        ways = [(block.begin, block.frequency) for block in blocks]
+        task = Mission(
+            number=0,
+            scenes=scenes,
+            settings=settings,
+            cost=seconds_of(n_unknowns, iterations_of_missions(ways, study.output_counts[-1])),
+            n_unknowns=n_unknowns,
+            blocks=blocks,
+            law=law,
+            wear_coefficient=wear_coefficient,
+            first=sweep if blocks[0].begin == "continue" else "",
+            missions=study.output_counts,
+            variables=tuple(study.recorded),
+            until=study.until,
+        )
+        found.setdefault(task, []).extend(numbers)
+    return tasks.number_points({task: [numbers] for task, numbers in found.items()}, points.n)
 
 
 def _blocks(
-    part: Study, at: Mapping[str, int], scenes: Sequence[int], contacts: Sequence[ContactChange]
+    part: Study, joints: Sequence[tasks.TaskJoint], frequency_at: int, amplitude_at: int, sweep_at: int
 ) -> Iterator[PlannedBlock]:
-    """The blocks of a point. at: indices of the point along the axes."""
-    for given, study, scene, contact in zip(part.mission, part.block_studies, scenes, contacts, strict=True):
-        amplitude, frequency = (
-            getattr(study.axes, name)[0 if given.gives(name) else at[name]]
-            for name in ("excitation_amplitude", "frequency")
+    """The blocks of a point, from its places on the axes."""
+    at = {"frequency": frequency_at, "excitation_amplitude": amplitude_at}
+    for given, study, joint in zip(part.mission, part.block_studies, joints, strict=True):
+        frequency, amplitude = (
+            getattr(study.axes, name)[0 if given.gives(name) else place] for name, place in at.items()
         )
-        begin: str = part.axes.sweep[at["sweep"]] if given.begin == "sweep" else given.begin
+        begin: str = part.axes.sweep[sweep_at] if given.begin == "sweep" else given.begin
         cycles = given.cycles_at(frequency)
         if given.passage is not None:
             frequency, begin = given.passage, given.passage.sweep
-        joint = tasks.joint_of(study, scene, contact)
         yield PlannedBlock(given.name, joint, frequency, amplitude, cycles, cast("Begin", begin))

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal, cast
+from typing import Any, Literal, cast
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from solver.model import ReducedModel
 from studyrunner.kinds import task as tasks
 from studyrunner.kinds.estimate import iterations_of_mode, seconds_of
 from studyrunner.kinds.results import first_harmonic, named
-from studyrunner.scene.scene_set import ContactChange, SceneSet
+from studyrunner.points.table import Points
 from studyrunner.study.study import Study
 from studyrunner.variables import OF_A_MODE_POINT
 
@@ -60,39 +60,28 @@ class Mode(tasks.Task):
         return f"mode {self.mode} {self.direction} to {self.amplitudes[place]:.3g} m sqrt(kg)"
 
 
-def build_tasks(
-    study: Study, scenes: SceneSet, n_displacements: Sequence[int], contacts: Sequence[Sequence[ContactChange]]
-) -> tasks.TaskPlan:
+def build_tasks(study: Study, points: Points, n_displacements: Sequence[int]) -> tasks.TaskPlan:
     """Tasks of a study of nonlinear modes: one along the amplitude for each joint, mode, direction and setting."""
-    amplitudes = study.axes.modal_amplitude or ()
-    ascending = sorted(range(len(amplitudes)), key=lambda place: amplitudes[place])
-    first, whole = (iterations_of_mode(number) for number in (1, len(amplitudes)))
-    modes: dict[Mode, list[dict[str, int]]] = {}
-    for part, (scene,), (contact,) in zip(scenes.parts, scenes.of_blocks, contacts, strict=True):
-        joint = tasks.joint_of(part.study, scene, contact)
-        of_part = dict(zip(study.axes_of_parts, part.place, strict=True))
-        for at, settings in tasks.grid(study):
-            n_unknowns = tasks.n_unknowns_of(n_displacements[joint.scene], settings.harmonics)
-            mode = Mode(
-                number=0,
-                scenes=(scene,),
-                settings=settings,
-                cost=seconds_of(n_unknowns, whole),
-                first_share=first / whole,
-                n_unknowns=n_unknowns,
-                joint=joint,
-                mode=study.axes.mode[at["mode"]],
-                direction=study.axes.sweep[at["sweep"]],
-                amplitudes=tuple(amplitudes[place] for place in ascending),
-                variables=tuple(study.recorded),
-            )
-            modes.setdefault(mode, []).append({**at, **of_part})
-    indices = {
-        mode: [
-            # dimensions of one value have no place
-            tuple(tuple({**at, "modal_amplitude": place}.get(name, 0) for name in study.dimensions) for at in lines)
-            for place in ascending
-        ]
-        for mode, lines in modes.items()
-    }
-    return tasks.number_points(indices, study)
+    modes: dict[tuple[Any, ...], dict[float, list[int]]] = {}
+    columns = (points.columns["joint"], *map(points.axis, ("mode", "sweep")), points.columns["settings"])
+    for (*own, amplitude), numbers in points.groups(*columns, points.axis("modal_amplitude")):
+        modes.setdefault(tuple(own), {})[amplitude] = numbers
+    found: dict[Mode, list[list[int]]] = {}
+    for ((joint,), mode, direction, settings), amplitudes in modes.items():
+        n_unknowns = tasks.n_unknowns_of(n_displacements[joint.scene], settings.harmonics)
+        first, whole = (iterations_of_mode(number) for number in (1, len(amplitudes)))
+        task = Mode(
+            number=0,
+            scenes=(joint.scene,),
+            settings=settings,
+            cost=seconds_of(n_unknowns, whole),
+            first_share=first / whole,
+            n_unknowns=n_unknowns,
+            joint=joint,
+            mode=mode,
+            direction=direction,
+            amplitudes=tuple(sorted(amplitudes)),
+            variables=tuple(study.recorded),
+        )
+        found[task] = [amplitudes[amplitude] for amplitude in task.amplitudes]
+    return tasks.number_points(found, points.n)

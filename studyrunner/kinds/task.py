@@ -4,14 +4,13 @@ There are four kinds of tasks: `Sweep` and `History` (`wear`), `Mode` (`modes`),
 """
 
 import hashlib
-import itertools
 import json
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -20,13 +19,12 @@ from solver.packing import Packed, unpack
 from solver.settings import Automatic, SolverSettings
 from studyrunner.kinds.estimate import AUTOMATIC_HARMONICS
 from studyrunner.mpi.dispatch import CostKeys
-from studyrunner.scene.scene_set import ContactChange
+from studyrunner.points.table import Points
+from studyrunner.scene.scene import SceneFacts
+from studyrunner.scene.scene_set import ContactChange, SceneSet, frequencies
 from studyrunner.study.sections import AUTO, SOLVER_AXES
 from studyrunner.study.study import Study
 from studyrunner.system.machine import MappedFile, package_digest
-
-Index = tuple[int, ...]
-"""Index of a point along the dimensions of the study."""
 
 Keep = Callable[[Packed | str], None]
 """Takes the progress of a task: data to continue from, or words."""
@@ -126,6 +124,21 @@ class Identity:
         return (self.scenes[joint.scene], joint.friction_coefficient, *joint.contact, package_digest("solver"))
 
 
+class Work(NamedTuple):
+    """What tasks take that are alike. way: what they do. n_results: that are computed, not read from others.
+
+    n_unknowns: most of one. seconds, longest: estimated time of all, and of one. start: the sweep that they wait for.
+    """
+
+    way: str
+    n_tasks: int
+    n_results: int
+    n_unknowns: int
+    seconds: float
+    longest: float
+    start: int | None = None
+
+
 @dataclass(frozen=True, kw_only=True)
 class Task(ABC):
     """A task, which gives one result or several, one after the other, each at a place of its own.
@@ -155,7 +168,7 @@ class Task(ABC):
     key: str = field(default="", compare=False, repr=False)
     models: tuple[ReducedModel | MappedFile, ...] = field(default=(), compare=False, repr=False)
     variables: tuple[str, ...] = ()
-    indices: tuple[tuple[Index, ...], ...] = ()
+    indices: tuple[tuple[int, ...], ...] = ()
 
     @property
     def order(self) -> tuple[int, ...]:
@@ -197,7 +210,18 @@ class Task(ABC):
         """Most general of the groups."""
         return self.cost_keys[0][:2]
 
-    def points(self, place: int) -> tuple[Index, ...]:
+    @property
+    def way(self) -> str:
+        """What it does, in a word."""
+        return type(self).__name__.lower()
+
+    @property
+    def work(self) -> Work:
+        """What it takes."""
+        start = None if self.waits_for is None else self.waits_for[0]
+        return Work(self.way, 1, self.n_results, self.n_unknowns, self.cost, self.cost, start)
+
+    def points(self, place: int) -> tuple[int, ...]:
         """Points that have the result at a place."""
         return self.indices[place] if self.indices else ()
 
@@ -232,14 +256,21 @@ def digest(*values: object) -> str:
 class TaskPlan:
     """All tasks of a study.
 
-    results: tasks that give the results of points; histories wait for a start state. sweeps: they give start states.
-    left_out: numbers of points that are not computed alone, by reason. n_points: of the study.
+    make: the tasks that give the results of points; histories wait for a start state. works: what they take, also of a
+    million of them. sweeps: the tasks that give start states. left_out: numbers of points that are not computed alone,
+    by reason. n_points: of the study.
     """
 
-    results: Sequence[Task]
+    make: Callable[[], Iterator[Task]]
+    works: Callable[[], Iterator[Work]]
     left_out: Mapping[str, int]
     n_points: int
     sweeps: tuple[Task, ...] = ()
+
+    @cached_property
+    def results(self) -> tuple[Task, ...]:
+        """The tasks that give the results of points."""
+        return tuple(self.make())
 
     def named(self, identity: Identity) -> "TaskPlan":
         """The plan with the names and keys of its tasks."""
@@ -248,8 +279,7 @@ class TaskPlan:
             names = task.hashes(identity)
             return replace(task, names=names, key=digest("task", names))
 
-        sweeps, results = (tuple(map(with_names, tasks)) for tasks in (self.sweeps, self.results))
-        return replace(self, sweeps=sweeps, results=results)
+        return replace(self, sweeps=tuple(map(with_names, self.sweeps)), make=lambda: map(with_names, self.make()))
 
     @cached_property
     def waiting(self) -> Mapping[tuple[int, int] | None, Sequence[Task]]:
@@ -260,29 +290,43 @@ class TaskPlan:
         return found
 
 
-def number_points(tasks: Mapping[Any, Sequence[tuple[Index, ...]]], study: Study) -> TaskPlan:
+def number_points(tasks: Mapping[Any, Sequence[Sequence[int]]], n_points: int) -> TaskPlan:
     """The plan of a study without start states. tasks: each, without number and points, with its `indices`."""
     results = tuple(
-        replace(task, number=number, indices=tuple(indices)) for number, (task, indices) in enumerate(tasks.items())
+        replace(task, number=number, indices=tuple(map(tuple, indices)))
+        for number, (task, indices) in enumerate(tasks.items())
     )
-    shared = study.n_points - sum(len(task.order) for task in results)
-    return TaskPlan(results, {EQUAL_POINTS: shared} if shared else {}, study.n_points)
+    shared = n_points - sum(len(task.order) for task in results)
+    left_out = {EQUAL_POINTS: shared} if shared else {}
+    return TaskPlan(results.__iter__, lambda: (task.work for task in results), left_out, n_points)
 
 
 # --- from a study to its tasks ---
 
 
-def grid(study: Study) -> Iterator[tuple[dict[str, int], SolverSettings]]:
-    """Points of a part of a study, the last axis fastest: indices along all axes of its kind, and the settings."""
-    names, limit = study.kind.axes, math.inf if study.solver.time_limit is None else study.solver.time_limit
-    solver = []
-    for places in itertools.product(*(range(len(getattr(study.solver, key))) for key in SOLVER_AXES)):
-        at = dict(zip(SOLVER_AXES, places, strict=True))
-        values = {key: getattr(study.solver, key)[place] for key, place in at.items()}
-        solver.append((at, SolverSettings(**values, time_limit=limit)))
-    for places in itertools.product(*(range(len(getattr(study.axes, name))) for name in names)):
-        for at, settings in solver:
-            yield {**dict(zip(names, places, strict=True)), **at}, settings
+def with_tasks(
+    study: Study, scenes: SceneSet, facts: Sequence[SceneFacts], contacts: Sequence[Sequence[ContactChange]]
+) -> Points:
+    """The points with what tasks are made of: "joint", a joint for each block, "law", "settings" and "hertz".
+
+    facts: of each scene. contacts: what differs in the pairs of each study, by block.
+    """
+    points, limit = scenes.points, math.inf if study.solver.time_limit is None else study.solver.time_limit
+    parts = zip(points.studies, scenes.of_blocks, contacts, strict=True)
+    joints = [
+        tuple(map(joint_of, own.block_studies or (own,), numbers, of_blocks)) for own, numbers, of_blocks in parts
+    ]
+
+    def settings(*values: Any) -> SolverSettings:
+        return SolverSettings(**dict(zip(SOLVER_AXES, values, strict=True)), time_limit=limit)
+
+    columns = {
+        "joint": points.of_studies(joints),
+        "law": points.of_studies([own.wear.as_law for own in points.studies]),
+        "settings": points.combined(settings, *map(points.axis, SOLVER_AXES)),
+        "hertz": frequencies(study, scenes, facts),
+    }
+    return replace(points, columns={**points.columns, **columns})
 
 
 def up_or_down(n_places: int, direction: str) -> tuple[int, ...]:

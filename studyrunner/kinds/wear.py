@@ -16,7 +16,7 @@ from solver.outcome import Outcome
 from solver.packing import Packed, pack, unpack
 from solver.settings import FollowedFrequency, Resolution, ToTheEnd, WearTarget
 from studyrunner.kinds.results import build_result
-from studyrunner.kinds.task import Identity, Keep, PointResult, StartResult, Task, TaskJoint, digest, up_or_down
+from studyrunner.kinds.task import Identity, Keep, PointResult, StartResult, Task, TaskJoint, Work, digest, up_or_down
 from studyrunner.mpi.dispatch import CostKeys
 from studyrunner.variables import OWN_STEPS
 
@@ -98,6 +98,11 @@ class Sweep(_FromRest):
     frequencies: tuple[float, ...]
 
     @property
+    def way(self) -> str:
+        """How the states are reached: "sweep" or "ramp"."""
+        return "ramp" if self.excitation.direction == "ramp" else "sweep"
+
+    @property
     def order(self) -> tuple[int, ...]:
         """Indices of the frequencies in the order of the sweep."""
         return up_or_down(len(self.frequencies), self.excitation.direction)
@@ -148,8 +153,7 @@ class Sweep(_FromRest):
 
     def describe(self, place: int) -> str:
         """Where the sweep goes."""
-        direction = self.excitation.direction
-        how = "ramp" if direction == "ramp" else f"sweep {direction}"
+        how = self.way if self.way == "ramp" else f"sweep {self.excitation.direction}"
         return f"{how} to {self.frequencies[place]:.6g} Hz"
 
 
@@ -186,6 +190,11 @@ class History(_FromRest):
     def waits_for(self) -> tuple[int, int]:
         """The start state."""
         return self.sweep, self.position
+
+    @property
+    def work(self) -> Work:
+        """Of its histories those that are integrated."""
+        return super().work._replace(n_results=len(self.integrated))
 
     @property
     def wear_coefficient(self) -> float:

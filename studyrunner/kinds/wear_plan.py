@@ -9,22 +9,28 @@ import itertools
 import math
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
-from functools import cache, partial
-from operator import itemgetter
+from functools import lru_cache, partial
 from typing import Any, NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
 from solver.contact.wear_law import WearLaw
-from solver.settings import SolverSettings, ToTheEnd
+from solver.settings import ToTheEnd
 from studyrunner.kinds.estimate import iterations_of_histories, iterations_of_sweep, seconds_of
-from studyrunner.kinds.task import EQUAL_POINTS, Index, TaskJoint, TaskPlan, grid, joint_of, n_unknowns_of
+from studyrunner.kinds.task import EQUAL_POINTS, TaskPlan, Work, n_unknowns_of
 from studyrunner.kinds.wear import Excitation, History, Integrated, Sweep
-from studyrunner.scene.scene_set import ContactChange, SceneSet
+from studyrunner.points.table import Points
 from studyrunner.study.study import Study
 from studyrunner.variables import OWN_STEPS
 
 MOST_TOGETHER = 4
 """Histories of one task, which share the adaptive history that given steps are compared with. It takes about as long as
 one of them: with 4 a fifth more than with all, and another rank may take the rest."""
+
+_MOST_KNOWN = (
+    1000  # ways to share histories: with equal values most start states have the same, others one of their own
+)
 
 _REASONS = {
     "cycles": "only the unworn states are asked for, the same for every step and scheme",
@@ -45,19 +51,6 @@ class _Values(NamedTuple):
     scheme: str
 
 
-class _Points(NamedTuple):
-    """Points that begin from one start state: of each its values, and its index along the dimensions of the study."""
-
-    values: list[_Values]
-    at: list[Index]
-
-
-_Case = tuple[TaskJoint, Excitation, SolverSettings]
-"""What the states of a sweep have in common."""
-
-_Starts = dict[WearLaw, dict[float, _Points]]
-"""Points by wear law and frequency, in the order of the study."""
-
 _Shared = tuple[Integrated, tuple[tuple[int, ...], ...]]
 """A history that is integrated, and which points, by their numbers, have each history that is read from it."""
 
@@ -70,29 +63,29 @@ class _Together(NamedTuple):
     iterations: float
 
 
+class _Group(NamedTuple):
+    """Points that begin from one start state with one wear law: their numbers, and what they differ in.
+
+    sweep, position: of the start state.
+    """
+
+    sweep: Sweep
+    position: int
+    law: WearLaw
+    numbers: NDArray[np.intp]
+    values: tuple[_Values, ...]
+
+
 _Sharing = Callable[[tuple[_Values, ...]], tuple[tuple[_Together, ...], Counter[str]]]
 """`_share_histories` of a study: most start states have points with the same values."""
 
 
-class _Histories(Sequence[History]):
-    """The histories of a study, each made when it is asked for: `--plan` of 10^6 points takes a fifth of the memory."""
-
-    def __init__(self, make: Callable[[], Iterator[History]], length: int) -> None:
-        self._make, self._length = make, length
-
-    def __len__(self) -> int:
-        return self._length
-
-    def __iter__(self) -> Iterator[History]:
-        return self._make()
-
-    def __getitem__(self, place: Any) -> Any:
-        return tuple(self)[place]
+def _begins(*columns: NDArray[Any]) -> NDArray[np.intp]:
+    """Places at which one of the columns (n,) has another value than before."""
+    return np.flatnonzero(np.any([np.append(True, each[1:] != each[:-1]) for each in columns], axis=0))
 
 
-def build_tasks(
-    study: Study, scenes: SceneSet, n_displacements: Sequence[int], contacts: Sequence[Sequence[ContactChange]]
-) -> TaskPlan:
+def build_tasks(study: Study, points: Points, n_displacements: Sequence[int]) -> TaskPlan:
     """Tasks of a study of wear.
 
     Points whose history is the same for a reason that the study itself shows share a task. Points with a solution of
@@ -105,78 +98,92 @@ def build_tasks(
         "until": study.until,
         "to_the_end": ToTheEnd(len(study.output_counts), study.slow_time.final_share) if study.to_the_end else None,
     }
-    sharing = cache(partial(_share_histories, study))
-    sweeps, of_sweeps, causes, n_histories = list[Sweep](), list[_Starts](), Counter[str](), 0
-    for (joint, excitation, settings), starts in _cases(study, contacts, scenes).items():
-        ascending, direction = sorted(set[float]().union(*starts.values())), excitation.direction
-        n_unknowns = n_unknowns_of(n_displacements[joint.scene], settings.harmonics)
-        case: dict[str, Any] = {"joint": joint, "excitation": excitation, "settings": settings}
-        case |= {"scenes": (joint.scene,), "n_unknowns": n_unknowns}
-        for frequencies in [[one] for one in ascending] if direction == "ramp" else [ascending]:
-            first, whole = (iterations_of_sweep(direction, number) for number in (1, len(frequencies)))
-            case |= {"cost": seconds_of(n_unknowns, whole), "first_share": first / whole}
-            sweeps.append(Sweep(number=len(sweeps), frequencies=tuple(frequencies), **case))
-            of_sweeps.append(starts)
-        for points in itertools.chain.from_iterable(of_law.values() for of_law in starts.values()):
-            tasks, shared = sharing(tuple(points.values))
-            n_histories += len(tasks)
-            causes.update(shared)
-
-    make = partial(_make_histories, tuple(zip(sweeps, of_sweeps, strict=True)), sharing, outputs)
+    sharing: _Sharing = lru_cache(_MOST_KNOWN)(partial(_share_histories, study))
+    sweeps, groups = _find_starts(study, points, n_displacements)
+    causes = Counter[str]()
+    for group in groups():
+        causes.update(sharing(group.values)[1])
     left_out = {reason: causes[cause] for cause, reason in _REASONS.items() if causes[cause]}
-    return TaskPlan(_Histories(make, n_histories), left_out, study.n_points, tuple(sweeps))
+
+    def works() -> Iterator[Work]:
+        for sweep, *_, values in groups():
+            tasks, n_unknowns = sharing(values)[0], sweep.n_unknowns
+            costs = [seconds_of(n_unknowns, each.iterations) for each in tasks]
+            n_integrated = sum(len(each.integrated) for each in tasks)
+            yield Work("history", len(tasks), n_integrated, n_unknowns, sum(costs), max(costs), sweep.number)
+
+    make = partial(_make_histories, groups, sharing, outputs)
+    return TaskPlan(make, works, left_out, points.n, tuple(sweeps))
+
+
+def _find_starts(
+    study: Study, points: Points, n_displacements: Sequence[int]
+) -> tuple[list[Sweep], Callable[[], Iterator[_Group]]]:
+    """The sweeps of a study, and the points that begin from their states, made anew each time: there may be many."""
+    columns = points.columns
+    own = columns["joint"], points.axis("excitation_amplitude"), points.axis("sweep"), columns["settings"]
+    (case, cases), (line, lines) = points.walked(*own), points.walked(*own, columns["law"])
+    kind, kinds = points.walked(*map(points.axis, ("wear_coefficient", "step", "scheme")))
+    places, frequencies = points.walked(columns["hertz"])
+    frequency = np.array(frequencies)[places, 0]
+    order = np.lexsort((line, frequency, case))
+    case, line, frequency = case[order], line[order], frequency[order]
+    bounds, first = _begins(case, frequency, line), _begins(case, frequency)
+    sweeps, of_start = list[Sweep](), list[tuple[Sweep, int]]()
+    for begin, end in itertools.pairwise([*_begins(case[first]).tolist(), len(first)]):
+        (joint,), amplitude, direction, settings = cases[case[first[begin]]]
+        n_unknowns = n_unknowns_of(n_displacements[joint.scene], settings.harmonics)
+        length = 1 if direction == "ramp" else end - begin
+        one, whole = (iterations_of_sweep(direction, number) for number in (1, length))
+        for place in range(begin, end, length):
+            sweep = Sweep(
+                number=len(sweeps),
+                scenes=(joint.scene,),
+                settings=settings,
+                cost=seconds_of(n_unknowns, whole),
+                first_share=one / whole,
+                n_unknowns=n_unknowns,
+                joint=joint,
+                excitation=Excitation(amplitude, direction, study.follow),
+                frequencies=tuple(frequency[first[place : place + length]].tolist()),
+            )
+            sweeps.append(sweep)
+            of_start += [(sweep, position) for position in range(length)]
+    start, numbers, values = np.searchsorted(first, bounds, side="right") - 1, points.numbers[order], kind[order]
+    known = [_Values(*each) for each in kinds]
+
+    def groups() -> Iterator[_Group]:
+        ends = np.append(bounds[1:], len(order)).tolist()
+        for at, begin, end in zip(start.tolist(), bounds.tolist(), ends, strict=True):
+            (sweep, position), own = of_start[at], tuple(known[place] for place in values[begin:end].tolist())
+            yield _Group(sweep, position, lines[line[begin]][-1], numbers[begin:end], own)
+
+    return sweeps, groups
 
 
 def _make_histories(
-    sweeps: Sequence[tuple[Sweep, _Starts]], sharing: _Sharing, outputs: Mapping[str, Any]
+    groups: Callable[[], Iterator[_Group]], sharing: _Sharing, outputs: Mapping[str, Any]
 ) -> Iterator[History]:
-    """The histories from the start states of all sweeps, in the order of the study."""
+    """The histories of a study, in the order of their start states."""
     number = itertools.count()
-    for sweep, starts in sweeps:
-        case = {name: getattr(sweep, name) for name in ("joint", "excitation", "settings", "scenes", "n_unknowns")}
-        for position, frequency in enumerate(sweep.frequencies):
-            for law, of_law in starts.items():
-                values, at = of_law.get(frequency, ((), ()))
-                for together in sharing(tuple(values))[0]:
-                    yield History(
-                        number=next(number),
-                        law=law,
-                        sweep=sweep.number,
-                        position=position,
-                        frequency=frequency,
-                        integrated=together.integrated,
-                        indices=tuple(tuple(at[point] for point in same) for same in together.points),
-                        cost=seconds_of(sweep.n_unknowns, together.iterations),
-                        **case,
-                        **outputs,
-                    )
-
-
-def _cases(study: Study, contacts: Sequence[Sequence[ContactChange]], scenes: SceneSet) -> dict[_Case, _Starts]:
-    """Points that one sweep reaches."""
-    cases, index = dict[_Case, _Starts](), itemgetter(*study.own_axes)
-    for part, (scene,), (contact,) in zip(scenes.parts, scenes.of_blocks, contacts, strict=True):
-        axes, joint, law = part.study.axes, joint_of(part.study, scene, contact), part.study.wear.as_law
-        # by the places on the axes, of which there are few, and not by what stands there
-        of_cases, all_values = dict[tuple[int, ...], dict[float, _Points]](), dict[tuple[int, ...], _Values]()
-        for at, settings in grid(part.study):
-            case = at["excitation_amplitude"], at["sweep"], id(settings)
-            if case not in of_cases:
-                amplitude, direction = axes.excitation_amplitude[case[0]], axes.sweep[case[1]]
-                excitation = Excitation(amplitude, direction, part.study.follow)
-                starts = cases.setdefault((joint, excitation, settings), {})
-                of_cases[case] = starts.setdefault(law, {})
-            frequency, of_law = axes.frequency[at["frequency"]], of_cases[case]
-            if frequency not in of_law:
-                of_law[frequency] = _Points([], [])
-            place = at["wear_coefficient"], at["step"], at["scheme"]
-            if place not in all_values:
-                wear, step, scheme = place
-                all_values[place] = _Values(axes.wear_coefficient[wear], axes.step[step], axes.scheme[scheme])
-            values, indices = of_law[frequency]
-            values.append(all_values[place])
-            indices.append((*index(at), *part.place))
-    return cases
+    for sweep, position, law, numbers, values in groups():
+        for together in sharing(values)[0]:
+            yield History(
+                number=next(number),
+                scenes=sweep.scenes,
+                settings=sweep.settings,
+                cost=seconds_of(sweep.n_unknowns, together.iterations),
+                n_unknowns=sweep.n_unknowns,
+                indices=tuple(tuple(numbers[list(same)].tolist()) for same in together.points),
+                joint=sweep.joint,
+                excitation=sweep.excitation,
+                law=law,
+                sweep=sweep.number,
+                position=position,
+                frequency=sweep.frequencies[position],
+                integrated=together.integrated,
+                **outputs,
+            )
 
 
 def _share_histories(study: Study, points: Sequence[_Values]) -> tuple[tuple[_Together, ...], Counter[str]]:

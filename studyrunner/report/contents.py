@@ -127,6 +127,7 @@ FIGURES = (
     Entry("frequency_response", "Frequency response of one joint, new and worn", response.draw_responses, **_RESPONSE),
     Entry("excitation_frequency", "Frequency of the followed resonance", wear.draw_excitation, kinds=_OF_WEAR),
     Entry("trends", "Trends along the axes of the study", points.draw_trends),
+    Entry("points", "Points of the design (table)", points.list_points, always=True),
     Entry("worn_root", "The worn root", root.draw_root, **_ONE),
     Entry("wear_depth", "Wear depth of each pair", pairs.draw_depths, **_ONE),
     Entry("worn_profile", "Worn profile of the contact surfaces", pairs.draw_profile, **_ONE),

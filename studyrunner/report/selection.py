@@ -10,9 +10,9 @@ import xarray as xr
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
+from studyrunner.coordinates import POINT, SAMPLE
 from studyrunner.report.drawing import FloatArray, line_style, set_log
 from studyrunner.result.view import Result
-from studyrunner.statistics.samples import SAMPLE
 from studyrunner.units import Scale, scale_for, units_of
 
 _DECADES = 30.0  # largest over smallest value from which an axis is logarithmic
@@ -106,9 +106,10 @@ class Course:
 
 def course_axis(result: Result) -> str | None:
     """The axis that figures are drawn over: the frequency, or where it does not vary the first other axis of several
-    numbers; None where nothing but words and samples varies.
+    numbers; None where nothing but words, samples and points of a design varies.
     """
-    numbers = [name for name in result.varying if result.dataset[name].dtype.kind in "iuf" and name != SAMPLE]
+    varying = [name for name in result.varying if name not in (POINT, SAMPLE)]
+    numbers = [name for name in varying if result.dataset[name].dtype.kind in "iuf"]
     of_first_rank = [name for name in ("frequency", "modal_amplitude") if name in numbers]
     return next(iter(of_first_rank + numbers), None)
 

@@ -6,13 +6,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.outcome import Outcome
-from studyrunner.coordinates import COORDINATES, STUCK_FREQUENCY, WORN_DEPTH
+from studyrunner.coordinates import COORDINATES, POINT, SAMPLE, STUCK_FREQUENCY, WORN_DEPTH
+from studyrunner.points.draw import block_of_input
+from studyrunner.points.table import Column, Points
 from studyrunner.scene import scene_set
 from studyrunner.scene.answers import SmallArray
 from studyrunner.scene.scene import SceneFacts
-from studyrunner.study.parts import block_of_input, draw_inputs
 from studyrunner.study.scene_axes import describe_key
-from studyrunner.study.study import Study
+from studyrunner.study.sections import SOLVER_AXES
+from studyrunner.study.study import NUMBERS, Study
 from studyrunner.variables import ASKED, LOOP_COMPONENTS, LOOP_PHASES, Variable
 
 _NAMED = COORDINATES | {
@@ -41,14 +43,17 @@ def small_arrays(
     study: Study, scenes: scene_set.SceneSet, facts: Sequence[SceneFacts], of_scene: Sequence[SmallArray] = ()
 ) -> list[SmallArray]:
     """Coordinates of the file, and its variables that no task computes. of_scene: what the study asks of the scene."""
-    names, stuck = scene_set.along_axes(study, scenes, [np.array(each.stuck_frequency) for each in facts])
-    ratios = study.axes.frequency_ratio
-    hertz = [] if ratios is None else [(("frequency_ratio", *names), np.multiply.outer(ratios, stuck))]
+    points, hertz = scenes.points, []
+    if study.axes.frequency_ratio is not None:
+        along = "frequency_ratio" if "frequency_ratio" in points.dims else POINT
+        hertz = [points.array(scene_set.frequencies(study, scenes, facts), keep=(along,))]
     return [
         *(SmallArray("frequency", *each, COORDINATES["frequency"]) for each in hertz),
         *coordinates(study, facts, scenes),
-        SmallArray("stuck_frequency", names, stuck, STUCK_FREQUENCY),
-        *_worn_coordinate(study, facts),
+        SmallArray(
+            "stuck_frequency", *scenes.along_axes([np.array(each.stuck_frequency) for each in facts]), STUCK_FREQUENCY
+        ),
+        *_worn_coordinate(study, facts, points),
         *sample_coordinates(study, facts, scenes),
         *of_scene,
     ]
@@ -64,20 +69,27 @@ def coordinates(study: Study, of_scenes: Sequence[SceneFacts], scenes: scene_set
     along |= {"contact": range(facts.contact.n_contact), "response": facts.response_names}
     if study.outputs.loops:
         along |= {"phase": 2.0 * np.pi * np.arange(LOOP_PHASES) / LOOP_PHASES, "component": LOOP_COMPONENTS}
+    dims = {name: name for name in along}
+    if study.design is not None:
+        tables = {axis.name: axis.values for axis in study.scene_axes}
+        for name, column in study.design.columns.items():
+            given = tables.get(name) or getattr(study.solver if name in SOLVER_AXES else study.axes, name)
+            along[name], dims[name] = [given[place] for place in column.codes.tolist()], POINT
     for name, values in along.items():
         # whole numbers and flags as NetCDF has them; texts where one value is text
         texts = any(isinstance(value, str) for value in values)
         labels = np.array([str(value) for value in values] if texts else values)
         labels = labels.astype({"b": np.int8, "i": np.int32}.get(labels.dtype.kind, labels.dtype))
-        yield SmallArray(name, (name,), labels, _coordinate_entry(study, name))
-    yield from _of_pairs(study, of_scenes, scenes)
+        yield SmallArray(name, (dims[name],), labels, _coordinate_entry(study, name))
+    yield from _of_pairs(of_scenes, scenes)
     if facts.edge is not None:
         yield SmallArray("contact_edge", ("contact",), facts.edge.astype(np.int8), COORDINATES["contact_edge"])
 
 
-def _of_pairs(study: Study, facts: Sequence[SceneFacts], scenes: scene_set.SceneSet) -> Iterator[SmallArray]:
+def _of_pairs(facts: Sequence[SceneFacts], scenes: scene_set.SceneSet) -> Iterator[SmallArray]:
     """Where the pairs are, along the axes along which scenes differ in them; NaN and "" of a pair that one lacks."""
-    names, numbers = scene_set.axes_of_difference(study, scenes, [each.pairs for each in facts])
+    same = {each.pairs: np.array(number) for number, each in enumerate(facts)}
+    names, numbers = scenes.along_axes([same[each.pairs] for each in facts])
     contacts = [each.contact for each in facts]
     shape = (len(facts), max(each.n_contact for each in contacts))
     position, area = np.full((*shape, 3), np.nan), np.full(shape, np.nan)
@@ -105,16 +117,12 @@ def _coordinate_entry(study: Study, name: str) -> Variable:
     return COORDINATES[name]
 
 
-def _worn_coordinate(study: Study, facts: Sequence[SceneFacts]) -> Iterator[SmallArray]:
+def _worn_coordinate(study: Study, facts: Sequence[SceneFacts], points: Points) -> Iterator[SmallArray]:
     """Wear depths with which the histories begin; none where the study has several scenes or no worn one."""
-    if study.scene.worn is None or len(facts) > 1:
-        return
-    axis = next((axis for axis in study.scene_axes if axis.key == ("worn",)), None)
-    # the axis of worn states is the last one
-    states = (study,) if axis is None else study.variants[: len(axis.values)]
-    values = np.array([scene_set.worn_depth(state, facts[0]) for state in states])
-    dimensions, values = (("contact",), values[0]) if axis is None else ((axis.name, "contact"), values)
-    yield SmallArray("worn_depth", dimensions, values, WORN_DEPTH)
+    if study.scene.worn is not None and len(facts) == 1:
+        axes = [axis.name for axis in study.scene_axes if axis.key == ("worn",)]
+        names, values = points.along([scene_set.worn_depth(each, facts[0]) for each in points.studies], keep=axes)
+        yield SmallArray("worn_depth", (*names, "contact"), values, WORN_DEPTH)
 
 
 def sample_coordinates(study: Study, facts: Sequence[SceneFacts], scenes: scene_set.SceneSet) -> Iterator[SmallArray]:
@@ -124,33 +132,31 @@ def sample_coordinates(study: Study, facts: Sequence[SceneFacts], scenes: scene_
     """
     if study.scatter is None:
         return
-    of_scenes = {axis.name: len(axis.values) for axis in study.scene_axes}
-    drawn = [draw_inputs(variant) for variant in study.variants or (study,)]
-    for name, first in drawn[0].items():
-        # those drawn around each value of an axis have that axis
-        names = (*of_scenes, *((name,) if first.ndim == 2 else ()), "sample")
-        values = np.array([each[name] for each in drawn]).reshape(*of_scenes.values(), *first.shape)
-        yield _sample_coordinate(study, name, names, values)
-    if scene_set.scatters_pairs(study):
-        of_parts = [of_part for _, _, of_part in scene_set.drawn_pairs(study, scenes, facts)]
-        n_contact = max(each.contact.n_contact for each in facts)
-        for name in of_parts[0]:
-            values = np.full((len(of_parts), n_contact), np.nan)
-            for row, of_part in zip(values, of_parts, strict=True):
-                row[: len(of_part[name])] = of_part[name]
-            values = values.reshape(*(len(each) for each in study.axes_of_parts.values()), n_contact)
-            yield _sample_coordinate(study, name, (*study.axes_of_parts, "contact"), values)
+    points = scenes.points
+    for name in study.scatter.inputs:
+        if name not in study.scatter.of_pairs:
+            yield _sample_coordinate(study, name, *points.array(_drawn(study, points, name), keep=(SAMPLE,)))
+    of_studies = scene_set.drawn_pairs(study, scenes, facts)
+    for name in study.scatter.of_pairs:
+        values = np.full((len(of_studies), max(each.contact.n_contact for each in facts)), np.nan)
+        for row, drawn in zip(values, of_studies, strict=True):
+            row[: len(drawn[name])] = drawn[name]
+        names, values = points.along(list(values), keep=(SAMPLE,))
+        yield _sample_coordinate(study, name, (*names, "contact"), values)
 
 
-def _sample_coordinate(study: Study, name: str, names: Sequence[str], values: NDArray[np.float64]) -> SmallArray:
-    """The values along those of their axes along which they differ, along samples and pairs in any case."""
-    dimensions: tuple[str, ...] = ()
-    for place, axis in reversed(list(enumerate(names))):
-        same = np.broadcast_to(values.take([0], axis=place), values.shape)
-        if axis not in ("sample", "contact") and np.array_equal(same, values, equal_nan=True):
-            values = np.asarray(values.take(0, axis=place))
-        else:
-            dimensions = (axis, *dimensions)
+def _drawn(study: Study, points: Points, name: str) -> Column:
+    """What the samples draw of an input that is the same for all pairs."""
+    in_block = block_of_input(study, name) is not None
+    parts = [each.block_studies[0] if in_block else each for each in points.studies]
+    if name in NUMBERS:
+        axes = [getattr(each.axes, name) for each in parts]
+        places = points.columns[name]
+        return points.combined(lambda number, at: axes[number][0 if in_block else at], points.columns["study"], places)
+    return points.of_studies([{**dict(each.scene.parameters), **each.wear.numbers}[name] for each in parts])
+
+
+def _sample_coordinate(study: Study, name: str, dimensions: tuple[str, ...], values: NDArray[np.float64]) -> SmallArray:
     if name in _NAMED:
         units, meaning = _NAMED[name].units, _NAMED[name].long_name
     elif name in study.wear.numbers:

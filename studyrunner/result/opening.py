@@ -17,8 +17,8 @@ import numpy as np
 import xarray as xr
 
 from solver.outcome import Outcome
-from studyrunner.coordinates import COORDINATES, SCENE, STUCK_FREQUENCY, WORN_DEPTH
-from studyrunner.statistics.samples import DRAWN, SAMPLE
+from studyrunner.coordinates import COORDINATES, POINT, SAMPLE, SCENE, STUCK_FREQUENCY, WORN_DEPTH
+from studyrunner.statistics.samples import DRAWN
 from studyrunner.study.text import check_result_file, read_toml
 from studyrunner.user_error import UserError, Verbatim, show_text
 from studyrunner.values import Wrong
@@ -179,7 +179,7 @@ def check_dataset(dataset: xr.Dataset, source: str) -> xr.Dataset:
         checked = dataset.drop_vars([name for name in dataset.variables if name not in known]).copy()
         for name, (dimensions, entry) in known.items():
             _check_variable(name, dataset.variables[name], dimensions, entry)
-            if name in COORDINATES or name.startswith(DRAWN):
+            if name in COORDINATES or name.startswith(DRAWN) or (dimensions, entry) == ((POINT,), None):
                 checked = checked.set_coords(name)
             variable = checked.variables[name]
             if variable.dtype.kind in "OSU":
@@ -224,14 +224,16 @@ def _known_variables(dataset: xr.Dataset) -> dict[str, tuple[tuple[str, ...], Va
         along = tuple(axis for axis in axes if axis in variable.dims)
         if name in dataset.dims:
             known[name] = (name,), None
-        elif name.startswith(DRAWN) or (name == "frequency" and "frequency_ratio" in axes):
+        elif name.startswith(DRAWN) or (name == "frequency" and along):
             known[name] = (*along, *(each for each in ("contact",) if each in variable.dims)), _DRAWN_VALUES
-            is_along = {SAMPLE, "frequency_ratio"} & set(along)
+            is_along = {SAMPLE, "frequency_ratio", POINT} & set(along)
             _need(is_along, name, f"dimensions {', '.join(map(str, variable.dims))}")
         elif name in with_axes:
             known[name] = (*axes, *with_axes[name].dimensions), with_axes[name]
         elif name in _OF_SCENE:
             known[name] = (*along, *_OF_SCENE[name].dimensions), _OF_SCENE[name]
+        elif variable.dims == (POINT,):
+            known[name] = (POINT,), None
     return known
 
 

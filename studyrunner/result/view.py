@@ -13,7 +13,8 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from solver.outcome import COMPLETE, SENSITIVE_ERROR, Outcome
-from studyrunner.result.opening import as_history, open_known, study_tables
+from studyrunner.coordinates import POINT
+from studyrunner.result.opening import ENDED, as_history, open_known, study_tables
 from studyrunner.statistics.study_statistics import statistics_of_file
 from studyrunner.units import show_cycles, show_value
 from studyrunner.user_error import UserError
@@ -67,6 +68,13 @@ class Result:
     def varying(self) -> tuple[str, ...]:
         """Axes of more than one value."""
         return tuple(name for name in self.axes if self.dataset.sizes[name] > 1)
+
+    @cached_property
+    def designed(self) -> list[str]:
+        """Columns that differ between the points of a design; none where the points are combinations of the axes."""
+        arrays = self.dataset.drop_vars([POINT, ENDED], errors="ignore").coords.items()
+        found = [(str(name), array.values) for name, array in arrays if array.dims == (POINT,)]
+        return [name for name, values in found if (values != values[0]).any()]
 
     @cached_property
     def numerical(self) -> list[str]:
@@ -171,7 +179,7 @@ class Result:
     @cached_property
     def rtol(self) -> NDArray[np.float64]:
         """Relative error that each point was to keep below; NaN where the file does not say."""
-        if "rtol" in self.axes:
+        if self.has("rtol"):
             return self.of_points("rtol").astype(float)
         value = self.study.get("solver", {}).get("rtol")
         return np.full(self.computed.shape, float(value) if isinstance(value, int | float) else math.nan)
@@ -252,7 +260,7 @@ class Result:
         if self.has("cycle_count"):
             has_slow_time = np.isfinite(self.of_points("cycle_count", -1))
         wanted = everywhere
-        for name in set(self.chosen) & set(self.varying):
+        for name in set(self.chosen) & {*self.varying, *self.designed}:
             wanted = wanted & (self.of_points(name) == self.chosen[name])
         best = self.best_known
         sets = (best & has_slow_time, self.usable & has_slow_time, best, self.computed, self.has_values, everywhere)
@@ -281,6 +289,9 @@ class Result:
         followed = f"the {self.followed}" if self.followed else ""
         names = [name for name in self.axes if name in named and name in point]
         values = {name: show_value(self.dataset[name], point[name]) for name in names}
+        if POINT in values and self.designed:
+            own = ", ".join(show_value(self.dataset[name], point[POINT]) for name in self.designed)
+            values[POINT] += f" ({own})"
         return ", ".join((name == "frequency" and followed) or value for name, value in values.items())
 
 
@@ -296,7 +307,8 @@ def open_for_report(path: Path | str, chosen: Mapping[str, str] | None = None) -
 
 def _find_value(dataset: xr.Dataset, name: str, text: str) -> float | str:
     """The value of an axis as it is in a file, from its text on the command line."""
-    axes = [str(axis) for axis in dataset["outcome"].dims]
+    columns = [name for name, array in dataset.coords.items() if array.dims == (POINT,) and name != POINT]
+    axes = [str(axis) for axis in (*dataset["outcome"].dims, *columns)]
     remedy = f"give one of the axes {', '.join(axes)}"
     if name in axes:
         values = dataset[name].values.tolist()

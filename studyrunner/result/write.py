@@ -57,7 +57,7 @@ def write_result(
     """
     shape = tuple(len(values) for values in study.dimensions.values())
     slab = _slab_shape(shape, completion.kind.itemsize)
-    keys, outcomes = _keys(shape, completion), Counter[int]()
+    keys, outcomes = _keys(completion), Counter[int]()
     if target.finished and not keys.all():
         for _, records in _slabs(shape, slab, completion, keys):
             outcomes.update(records["outcome"].tolist())
@@ -94,14 +94,14 @@ def _writing(path: Path) -> Iterator[netCDF4.Dataset]:
         raise find_fault(path) or OSError(None, f"the NetCDF library cannot write it ({error})") from error
 
 
-def _keys(shape: Sequence[int], completion: CompletionIndex) -> NDArray[np.bytes_]:
+def _keys(completion: CompletionIndex) -> NDArray[np.bytes_]:
     """Hashes of the results of points, in the order of the result file; empty for points that are not computed."""
-    keys = np.zeros(math.prod(shape), _KEY_TYPE)
+    keys = np.zeros(completion.plan.n_points, _KEY_TYPE)
     there = completion.store.keys(RESULTS)
     for task in completion.plan.results:
         for place, key in enumerate(task.names):
             if key in there:
-                keys[np.ravel_multi_index(np.transpose(task.points(place)), shape)] = key.encode()
+                keys[list(task.points(place))] = key.encode()
     return keys
 
 
@@ -144,7 +144,8 @@ def _create_all(
         file.createDimension(name, size)
     of_pairs = sorted((each for each in arrays if each.name.startswith("contact_")), key=lambda each: each.name)
     auxiliary = of_pairs + [each for each in arrays if each.name.startswith(("sample_", "worn_depth"))]
-    auxiliary += [each for each in arrays if each.name == "frequency" and "frequency_ratio" in each.dimensions]
+    designed = {"frequency", *(() if study.design is None else study.design.columns)}
+    auxiliary += [each for each in arrays if each.name in designed and each.dimensions != (each.name,)]
     for name, entry in variables.items():
         dimensions = (*study.dimensions, *entry.dimensions)
         # a chunk of loops holds a single pair: then pairs without loops take no room

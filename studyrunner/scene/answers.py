@@ -1,7 +1,9 @@
 """What a study asks of its scenes beside their models: mesh, natural frequencies, exact answers, scene files."""
 
+import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from operator import itemgetter
 from pathlib import Path
 from typing import Any, cast
 
@@ -11,10 +13,10 @@ from numpy.typing import NDArray
 from solver.model import ReducedModel
 from studies.scene import Progress, as_scene, stuck_frequencies
 from studyrunner.coordinates import COORDINATES, SCENE
+from studyrunner.points.table import points_of
 from studyrunner.scene.scene import build_mesh, build_study_scene, describe_origin, harmonics_to_build
-from studyrunner.scene.scene_set import SceneSet, along_axes, find_scenes
+from studyrunner.scene.scene_set import SceneSet, find_scenes
 from studyrunner.study.mistakes import scene_errors
-from studyrunner.study.parts import parts_of
 from studyrunner.study.study import Study
 from studyrunner.user_error import UserError, Verbatim, show_text
 from studyrunner.variables import Variable
@@ -116,7 +118,7 @@ def write_study_scene(study: Study, path: Path, progress: Progress) -> None:
 
 
 def join_scene_variables(
-    study: Study, scenes: SceneSet, of_scenes: Sequence[Sequence[SmallArray]]
+    scenes: SceneSet, of_scenes: Sequence[Sequence[SmallArray]]
 ) -> tuple[tuple[SmallArray, ...], tuple[str, ...]]:
     """Variables of all scenes, first along the axes along which they differ, and notes on those that are left out.
 
@@ -128,7 +130,7 @@ def join_scene_variables(
         if len({each.values.shape for each in variables}) > 1:
             left_out.append(first.name)
             continue
-        names, values = along_axes(study, scenes, [each.values for each in variables])
+        names, values = scenes.along_axes([each.values for each in variables])
         joined.append(replace(first, dimensions=(*names, *first.dimensions), values=values))
     notes = [f"{', '.join(left_out)}: left out of the result, as the scenes differ in their sizes"] if left_out else []
     return tuple(joined), tuple(notes)
@@ -141,21 +143,20 @@ def exact_answers(study: Study) -> tuple[SmallArray, ...]:
     """
     if "exact" not in study.outputs.variables:
         return ()
-    answers: list[Any] = []
-    for part in parts_of(study):
-        axes, scene = part.study.axes, part.study.scene
-        (depth,) = (0.0,) if scene.worn is None else scene.worn.depths(1)
-        rest = np.array(axes.wear_coefficient), np.array(part.study.output_counts), part.study.wear.as_law, depth
-        exact, changed = cast(Any, scene.parameters).exact_answer, _changed(part.study)
-        answers.append([[exact(f, a, *rest, changed) for a in axes.excitation_amplitude] for f in axes.frequency])
-    others = (*(1,) * (len(study.own_axes) - 3), *(len(values) for values in study.axes_of_parts.values()))
-    variables = []
+    points = points_of(study)
+    axes = [points.axis(name) for name in ("frequency", "excitation_amplitude", "wear_coefficient")]
+    names, codes, combinations = points.grouped(points.columns["study"], *axes)
+    answers = list[tuple[Any, Any]]()
+    for (number, frequency, amplitude), alike in itertools.groupby(combinations, itemgetter(0, 1, 2)):
+        own, wear = points.studies[number], np.array([each[3] for each in alike])
+        (depth,) = (0.0,) if own.scene.worn is None else own.scene.worn.depths(1)
+        rest = wear, np.array(own.output_counts), own.wear.as_law, depth, _changed(own)
+        answers += zip(*cast(Any, own.scene.parameters).exact_answer(frequency, amplitude, *rest), strict=True)
+    shape, variables = [length if name in names else 1 for name, length in points.dims.items()], []
     for place, (name, entry) in enumerate(SCENE["exact"].items()):
-        values = np.array([[[each[place] for each in row] for row in part] for part in answers])
-        # frequency, wear coefficient and excitation amplitude are the first axes of a result, in this order
-        values = np.moveaxis(values, (1, 3, 2), (0, 1, 2))
-        values = values.reshape(*values.shape[:3], *others, *values.shape[4:])
-        variables.append(SmallArray(name, (*study.dimensions, *entry.dimensions), values, entry, over_axes=True))
+        values = np.array([each[place] for each in answers])[codes]
+        values = values.reshape(*shape, *values.shape[len(names) :])
+        variables.append(SmallArray(name, (*points.dims, *entry.dimensions), values, entry, over_axes=True))
     return tuple(variables)
 
 

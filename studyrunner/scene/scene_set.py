@@ -1,10 +1,10 @@
-"""The scenes of a study: which of its parts share one, what a result says of them, and what differs in their pairs."""
+"""The scenes of a study: which of its points share one, what a result says of them, and what differs in their pairs."""
 
 import hashlib
 import json
 import math
 import time
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from studies.scene import Progress
+from studyrunner.points.draw import draw_inputs
+from studyrunner.points.table import Column, Points, points_of
 from studyrunner.scene.scene import SceneFacts, build_study_scene, describe_scene, harmonics_to_build
-from studyrunner.study.mistakes import keys_as_given
-from studyrunner.study.parts import Part, draw_inputs, parts_of
-from studyrunner.study.scene_axes import keys_below_axes
 from studyrunner.study.study import Study
+from studyrunner.study.study_file import keys_in_file
 from studyrunner.user_error import UserError
 from studyrunner.values import Wrong
 
@@ -27,29 +27,30 @@ _MOST_PLANNED = 8
 class SceneSet:
     """The different scenes of a study.
 
-    studies: for each scene a study without axes of the scene, from which the scene is built. parts: of the study
-    (`parts_of`). of_blocks: for each part the numbers of the scenes of its blocks, or of its only vibration.
+    studies: for each scene a study without axes of the scene, from which the scene is built. points: of the study.
+    of_blocks: for each of their studies the numbers of the scenes of its blocks, or of its only vibration.
     """
 
     studies: tuple[Study, ...]
-    parts: tuple[Part, ...]
+    points: Points
     of_blocks: tuple[tuple[int, ...], ...]
 
-    @property
-    def numbers(self) -> tuple[int, ...]:
-        """Number of the scene of each part, of its first block in a study of missions."""
-        return tuple(numbers[0] for numbers in self.of_blocks)
+    def along_axes(self, values: Sequence[NDArray[Any]]) -> tuple[tuple[str, ...], NDArray[Any]]:
+        """Axes along which arrays of the scenes differ, and these arrays along the axes; of missions those of the first
+        block. values: of each scene, alike.
+        """
+        return self.points.along([values[numbers[0]] for numbers in self.of_blocks])
 
 
 def find_scenes(study: Study) -> SceneSet:
-    """The scenes of a study; parts that differ only in what no model depends on share one.
+    """The scenes of a study; points that differ only in what no model depends on share one.
 
     Raises UserError where a result file is to hold the scene, and there are several.
     """
-    parts, studies, keys = parts_of(study), dict[str, Study](), list[list[str]]()
-    for part in parts:
+    points, studies, keys = points_of(study), dict[str, Study](), list[list[str]]()
+    for own in points.studies:
         keys.append([])
-        for each in part.study.block_studies or (part.study,):
+        for each in own.block_studies or (own,):
             scene, harmonics = each.scene, harmonics_to_build(each)
             files = None if scene.files is None else [str(path) for path in scene.files.all]
             where = None if scene.path is None else str(scene.path), scene.group, files
@@ -59,26 +60,22 @@ def find_scenes(study: Study) -> SceneSet:
         remedy = f"leave it out: the study has {len(studies)} scenes, and a result keeps one"
         raise UserError(study.source, "outputs.scene", True, remedy)
     number_of = {key: number for number, key in enumerate(studies)}
-    of_blocks = tuple(tuple(number_of[key] for key in each) for each in keys)
-    return SceneSet(tuple(studies.values()), parts, of_blocks)
+    return SceneSet(tuple(studies.values()), points, tuple(tuple(number_of[key] for key in each) for each in keys))
 
 
-def at_ratios(scenes: SceneSet, facts: Sequence[SceneFacts]) -> SceneSet:
-    """The same with excitation frequencies in Hz, where the study gives their ratios. facts: of each scene.
+def frequencies(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]) -> Column:
+    """Excitation frequencies, Hz, also where the study gives their ratios. facts: of each scene.
 
     Raises UserError where a scene has no natural frequency with the joint stuck.
     """
-    parts = []
-    for part, number in zip(scenes.parts, scenes.numbers, strict=True):
-        axes, stuck = part.study.axes, facts[number].stuck_frequency
-        if axes.frequency_ratio is None:
-            return scenes
-        if math.isnan(stuck):
-            remedy = "give axes.frequency in its place: nothing that has mass moves while all pairs stick"
-            raise UserError(part.study.source, "axes.frequency_ratio", list(axes.frequency_ratio), remedy)
-        hertz = axes.model_copy(update={"frequency": tuple(ratio * stuck for ratio in axes.frequency_ratio)})
-        parts.append(replace(part, study=part.study.model_copy(update={"axes": hertz})))
-    return replace(scenes, parts=tuple(parts))
+    given = scenes.points.axis("frequency")
+    if study.axes.frequency_ratio is None:
+        return given
+    stuck = [facts[numbers[0]].stuck_frequency for numbers in scenes.of_blocks]
+    if any(map(math.isnan, stuck)):
+        remedy = "give axes.frequency in its place: nothing that has mass moves while all pairs stick"
+        raise UserError(study.source, "axes.frequency_ratio", list(study.axes.frequency_ratio), remedy)
+    return scenes.points.combined(lambda ratio, own: ratio * own, given, scenes.points.of_studies(stuck))
 
 
 def plan_scenes(study: Study, say: Progress) -> tuple[SceneSet, tuple[SceneFacts, ...], float]:
@@ -94,11 +91,11 @@ def plan_scenes(study: Study, say: Progress) -> tuple[SceneSet, tuple[SceneFacts
         sizes = str([value for _, value in each.scene.parameters if is_block or not isinstance(value, float)])
         if sizes not in built and len(built) < _MOST_PLANNED:
             say(f"building scene {number + 1} of {len(scenes.studies)}")
-            with keys_as_given(keys_below_axes(study.scene_axes)):
+            with keys_in_file(study):
                 built[sizes] = describe_scene(build_study_scene(each, say))
         facts.append(built.get(sizes) or next(reversed(built.values())))
     left = (time.monotonic() - began) / len(built) * (len(facts) - len(built))
-    return at_ratios(scenes, facts), tuple(facts), left
+    return scenes, tuple(facts), left
 
 
 def merge_facts(facts: Sequence[SceneFacts]) -> SceneFacts:
@@ -116,33 +113,6 @@ def merge_facts(facts: Sequence[SceneFacts]) -> SceneFacts:
     )
 
 
-def along_axes(study: Study, scenes: SceneSet, values: Sequence[NDArray[Any]]) -> tuple[tuple[str, ...], NDArray[Any]]:
-    """Axes along which arrays of the scenes differ, and these arrays along the axes. values: of each scene, alike."""
-    names, numbers = axes_of_difference(study, scenes, [each.tobytes() for each in values])
-    return names, np.stack(values)[numbers]
-
-
-def axes_of_difference(
-    study: Study, scenes: SceneSet, keys: Sequence[Hashable]
-) -> tuple[tuple[str, ...], NDArray[np.intp]]:
-    """Names of the axes along which something differs between the scenes, and numbers of scenes along these axes.
-
-    keys: of each scene, equal where the scenes are equal in it.
-    """
-    if len(set(keys)) == 1:
-        return (), np.array(0)
-    first: dict[Hashable, int] = {}
-    alike = np.array([first.setdefault(key, number) for number, key in enumerate(keys)])
-    numbers = alike[list(scenes.numbers)].reshape([len(values) for values in study.axes_of_parts.values()])
-    names = []
-    for place, name in reversed(list(enumerate(study.axes_of_parts))):
-        if (numbers == numbers.take([0], axis=place)).all():
-            numbers = numbers.take(0, axis=place)
-        else:
-            names.append(name)
-    return tuple(reversed(names)), numbers
-
-
 # --- contact pairs that are not those of the scene: drawn values, wear before the start ---
 
 ContactChange = tuple[tuple[str, tuple[float, ...]], ...]
@@ -154,7 +124,7 @@ _Values = dict[str, NDArray[np.float64]]
 def contact_changes(
     study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]
 ) -> tuple[tuple[ContactChange, ...], ...]:
-    """What differs from the pairs of the scene, for each part of a study (`parts_of`) by block, or the only vibration.
+    """What differs from the pairs of the scene, for each study of its points by block, or the only vibration.
 
     facts: of each scene. Raises UserError where a sample draws a value that is none, or blocks differ in their pairs.
     """
@@ -164,44 +134,42 @@ def contact_changes(
                 remedy = f"give parameters with which it has the contact pairs of {study.mission[0].name}, which wear"
                 raise UserError(study.source, f"mission.{block.name}", None, remedy)
     of_blocks = []
-    for place in range(len(study.mission)) if study.mission else (None,):
+    for place in range(len(study.mission) or 1):
         changes: list[ContactChange] = []
-        for variant, own, of_sample in drawn_pairs(study, scenes, facts, place):
-            if variant.scene.worn is not None:
+        of_pairs = drawn_pairs(study, scenes, facts, place)
+        for whole, numbers, drawn in zip(scenes.points.studies, scenes.of_blocks, of_pairs, strict=True):
+            own, scene = whole.block_studies[place] if study.mission else whole, facts[numbers[place]]
+            if own.scene.worn is not None:
                 # wear opens a pair as a gap does, Eq. (7)
-                of_sample["gap"] = of_sample.get("gap", own.contact.gap) + worn_depth(variant, own)
-            changes.append(tuple((name, tuple(each.tolist())) for name, each in of_sample.items()))
+                drawn = {**drawn, "gap": drawn.get("gap", scene.contact.gap) + worn_depth(own, scene)}
+            changes.append(tuple((name, tuple(each.tolist())) for name, each in drawn.items()))
         of_blocks.append(changes)
     return tuple(zip(*of_blocks, strict=True))
 
 
-def drawn_pairs(
-    study: Study, scenes: SceneSet, facts: Sequence[SceneFacts], block: int | None = None
-) -> Iterator[tuple[Study, SceneFacts, _Values]]:
-    """For each part of a study its variant, its scene, and drawn values (n_contact,) of the inputs of pairs.
+def drawn_pairs(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts], block: int = 0) -> list[_Values]:
+    """For each study of the points drawn values (n_contact,) of the inputs of pairs. facts: of each scene.
 
-    facts: of each scene. block: place of the block in a mission. Raises UserError as `contact_changes`.
+    block: place of the block in a mission. Raises UserError as `contact_changes`.
     """
-    of_parts = iter(scenes.of_blocks)
+    if study.scatter is None or not study.scatter.of_pairs:
+        return [{}] * len(scenes.points.studies)
+    of_studies, found = iter(scenes.of_blocks), []
     for whole in study.variants or (study,):
-        variant = whole if block is None else whole.block_studies[block]
+        variant = whole.block_studies[block] if study.mission else whole
         # scenes of samples mostly have the same pairs, and then the same draws
         drawn: dict[Hashable, _Values] = {}
-        for sample in range(1 if study.scatter is None else study.scatter.n_rows):
-            own = facts[next(of_parts)[block or 0]]
+        for sample in range(study.scatter.n_rows):
+            own = facts[next(of_studies)[block]]
             contact, friction = own.contact, own.contact.friction_coefficient
             key = own.pairs, contact.gap.tobytes(), None if friction is None else friction.tobytes()
-            if key not in drawn and scatters_pairs(study):
+            if key not in drawn:
                 of_all = np.nan if variant.friction_coefficient is None else variant.friction_coefficient
                 friction = np.full(contact.n_contact, of_all) if friction is None else friction
                 values = {"gap": contact.gap, "area": contact.area, "friction_coefficient": friction}
                 drawn[key] = draw_inputs(variant, contact, values)
-            yield variant, own, {name: each[sample] for name, each in drawn.get(key, {}).items()}
-
-
-def scatters_pairs(study: Study) -> bool:
-    """Whether samples draw values of contact pairs."""
-    return study.scatter is not None and bool(study.scatter.of_pairs)
+            found.append({name: each[sample] for name, each in drawn[key].items()})
+    return found
 
 
 def worn_depth(study: Study, facts: SceneFacts) -> NDArray[np.float64]:

@@ -17,7 +17,7 @@ import scipy  # whose parts are loaded at their first use
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-SAMPLE, CYCLE = "sample", "cycle"
+CYCLE = "cycle"
 DRAWN = "sample_"
 """How the coordinates with drawn values begin."""
 

@@ -10,9 +10,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import ArrayLike
 
+from studyrunner.coordinates import SAMPLE
 from studyrunner.scatter import ScatterSection
 from studyrunner.statistics import samples
-from studyrunner.statistics.samples import CYCLE, DRAWN, FEWEST, SAMPLE, Array, SampleValues
+from studyrunner.statistics.samples import CYCLE, DRAWN, FEWEST, Array, SampleValues
 from studyrunner.units import show_percent
 
 _QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)  # of the bands that figures show

@@ -15,9 +15,11 @@ from studyrunner.variables import OF_A_HISTORY
 _MOST_POINTS = 1_000_000
 
 
-def broken_rules(study: Study) -> Iterator[Wrong]:
-    """All that does not fit together. study: with its axes, without variants, and before it is complete."""
-    for rule in (_kind, _blocks, _frequency, _outputs, _solver_and_end, _scatter):
+def broken_rules(study: Study, first: bool) -> Iterator[Wrong]:
+    """All that does not fit together. study: with its axes, without variants, and before it is complete. first: whether
+    it is the first of the variants, which have the same axes.
+    """
+    for rule in (_kind, *((_blocks, _frequency) if first else ()), _outputs, _solver_and_end, _scatter):
         yield from rule(study)
 
 
@@ -81,7 +83,7 @@ def _outputs(study: Study) -> Iterator[Wrong]:
     """Variables are those of such a study, of different names, and of so many points at most."""
     known = [*study.kind.asked, *(name for name in SCENE if name != "exact" or study.kind is WEAR)]
     of_pairs = study.scatter is not None and bool(study.scatter.of_pairs)
-    no_exact = study.to_the_end or _followed(study) or study.axes.frequency_ratio or of_pairs
+    no_exact = study.to_the_end or study.loading is not None or study.axes.frequency_ratio or of_pairs
     for name in study.outputs.variables:
         remedy = ""
         if name not in (DEFAULT, *OF_A_HISTORY, *known):
@@ -129,7 +131,7 @@ def _scatter(study: Study) -> Iterator[Wrong]:
         giving = any(block.gives(name) for block in study.mission)
         if name not in known:
             yield Wrong(f"scatter.{name}", None, f"unknown input, give {nearest_name(name, known)}")
-        if name == "frequency" and (_followed(study) or study.axes.frequency_ratio or giving):
+        if name == "frequency" and (study.loading is not None or study.axes.frequency_ratio or giving):
             remedy = "leave it out: each sample, or a block, has a frequency of its own"
             yield Wrong(f"scatter.{name}", None, remedy)
         if scattered.distribution.is_absolute and (

@@ -9,6 +9,7 @@ from typing import Annotated, Any
 from pydantic import BaseModel, BeforeValidator, RootModel
 
 from studies.scene import Unit, said_of
+from studyrunner.study.design import Design
 from studyrunner.study.mistakes import check_tables, raise_wrong, tables_in
 from studyrunner.study.sections import SOLVER_AXES, AxesSection, WearSection
 from studyrunner.user_error import UserError
@@ -45,10 +46,13 @@ class _Values(RootModel[Annotated[tuple[Any, ...], BeforeValidator(read_axis)]])
     """Values of an axis of any kind."""
 
 
-def take_axes(tables: Tables, scene: type[BaseModel], source: str) -> tuple[SceneAxis, ...]:
+def take_axes(
+    tables: Tables, scene: type[BaseModel], source: str, design: Design | None = None
+) -> tuple[SceneAxis, ...]:
     """Axes that are keys of [scene] or [wear]. Keys of other tables are taken out of [axes], those of [solver] moved.
 
-    tables: of the study file. scene: what [scene] of this model consists of. Raises UserError.
+    tables: of the study file. scene: what [scene] of this model consists of. design: of which some may be columns.
+    Raises UserError.
     """
     tables_of = {"solver": SOLVER_AXES, "wear": WearSection.AXES, "scene": scene.model_fields}
     places = {name: table for table, names in tables_of.items() for name in names}
@@ -77,7 +81,8 @@ def take_axes(tables: Tables, scene: type[BaseModel], source: str) -> tuple[Scen
         key, table = keys[dotted], places[keys[dotted][0]]
         about = describe_key(scene if table == "scene" else WearSection, *key)
         axes.append(SceneAxis("_".join(key), table, key, checked.root, *about))
-    if (n_variants := math.prod(len(axis.values) for axis in axes)) > _MOST_VARIANTS:
+    rows, others = _rows_and_others(axes, design)
+    if (n_variants := len(rows) * math.prod(len(axis.values) for axis in others)) > _MOST_VARIANTS:
         longest = max(axes, key=lambda axis: len(axis.values))
         remedy = f"give fewer values: there are {n_variants} combinations of keys of [scene] and [wear], at most "
         remedy += f"{_MOST_VARIANTS} are possible; [scatter] takes more samples"
@@ -90,11 +95,28 @@ def keys_below_axes(scene_axes: Sequence[SceneAxis]) -> dict[str, str]:
     return {f"{axis.table}.{axis.key[0]}": f"axes.{axis.key[0]}" for axis in scene_axes if axis.key != ("worn",)}
 
 
-def variants_of(tables: Mapping[str, Any], scene_axes: Sequence[SceneAxis]) -> Iterator[Tables]:
-    """[scene] and [wear] with each combination of values of the axes, the last axis fastest."""
-    for values in itertools.product(*(axis.values for axis in scene_axes)):
+def _rows_and_others(
+    scene_axes: Sequence[SceneAxis], design: Design | None
+) -> tuple[list[list[tuple[SceneAxis, AxisValue]]], list[SceneAxis]]:
+    """The different values that rows of a design give to axes, and the axes that are none of its columns."""
+    columns = {} if design is None else design.columns
+    own = [axis for axis in scene_axes if axis.name in columns]
+    first = [0] if design is None else design.groups([axis.name for axis in own])[0]
+    rows = [[(axis, columns[axis.name].values[columns[axis.name].codes[row]]) for axis in own] for row in first]
+    return rows, [axis for axis in scene_axes if axis.name not in columns]
+
+
+def variants_of(
+    tables: Mapping[str, Any], scene_axes: Sequence[SceneAxis], design: Design | None = None
+) -> Iterator[Tables]:
+    """[scene] and [wear] with each combination of values of the axes, the last axis fastest.
+
+    Of axes that are columns of a design it is those that its rows have, in the order of `Design.groups`.
+    """
+    rows, others = _rows_and_others(scene_axes, design)
+    for row, values in itertools.product(rows, itertools.product(*(axis.values for axis in others))):
         changed = {name: dict(tables[name]) for name in ("scene", "wear")}
-        for axis, value in zip(scene_axes, values, strict=True):
+        for axis, value in (*row, *zip(others, values, strict=True)):
             table, (name, *inner) = changed[axis.table], axis.key
             given = table.get(name, {})
             if inner:

@@ -1,18 +1,19 @@
 """The study: what a study file says, checked, frozen and with every default filled in; the three kinds of study."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
 
-from pydantic import Field
+from pydantic import Field, InstanceOf
 
 from solver.settings import TARGETS, FollowedFrequency, WearTarget
 from studyrunner import variables
-from studyrunner.coordinates import SCENE
+from studyrunner.coordinates import POINT, SAMPLE, SCENE
 from studyrunner.scatter import ScatterSection
 from studyrunner.study import sections
+from studyrunner.study.design import Design
 from studyrunner.study.scene_axes import SceneAxis
 from studyrunner.study.scene_section import SceneSection
 from studyrunner.study.text import Archived
@@ -113,6 +114,7 @@ class Study(Section):
     - solver_axes: keys of [solver] that are given under [axes].
     - scene_axes: axes that are keys of [scene] or [wear]; variants: for each combination of their values, the last one
       fastest, the study with these values in [scene] and [wear]. This study has their first values.
+    - design: points that are rows of a table; axes that are its columns are no dimensions of the result.
     """
 
     study: sections.StudySection
@@ -133,6 +135,7 @@ class Study(Section):
     solver_axes: tuple[str, ...] = Field((), exclude=True)
     scene_axes: tuple[SceneAxis, ...] = Field((), exclude=True)
     variants: tuple["Study", ...] = Field((), exclude=True)
+    design: InstanceOf[Design] | None = Field(None, exclude=True)
 
     @property
     def kind(self) -> Kind:
@@ -193,28 +196,27 @@ class Study(Section):
         return tuple(number for number in self.solver.harmonics if number != sections.AUTO)
 
     @property
-    def dimensions(self) -> Mapping[str, tuple[float | str, ...]]:
+    def dimensions(self) -> Mapping[str, Sequence[float | str]]:
         """Names and values of the axes of the result, in their order; solver keys only where they are axes."""
         names = {} if self.axes.frequency_ratio is None else {"frequency": "frequency_ratio"}
         own = {
             names.get(name, name): self.solver if name in sections.SOLVER_AXES else self.axes for name in self.own_axes
         }
-        found = {name: getattr(table, name) or () for name, table in own.items()} | self.axes_of_parts
+        found: dict[str, Sequence[float | str]] = {name: getattr(table, name) or () for name, table in own.items()}
+        found |= {axis.name: axis.values for axis in self.scene_axes}
+        found |= {} if self.scatter is None else {SAMPLE: range(self.scatter.n_rows)}
         if self.axes.modal_amplitude is not None:
             worn = found.pop("cycle", (0.0,))
             found |= {"modal_amplitude": self.axes.modal_amplitude, "cycle": worn}
-        return found
+        if self.design is None:
+            return found
+        left = {name: values for name, values in found.items() if name not in self.design.columns}
+        return {POINT: range(self.design.n), **left}
 
     @property
     def n_points(self) -> int:
         """Number of points of the result."""
         return math.prod(len(values) for values in self.dimensions.values())
-
-    @property
-    def axes_of_parts(self) -> dict[str, tuple[float | str, ...]]:
-        """Names and values of the axes whose points are parts of the study (`parts_of`), the last of the result."""
-        samples = {} if self.scatter is None else {"sample": tuple(range(self.scatter.n_rows))}
-        return {**{axis.name: axis.values for axis in self.scene_axes}, **samples}
 
     @property
     def own_axes(self) -> tuple[str, ...]:

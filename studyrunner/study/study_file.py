@@ -1,9 +1,10 @@
 """Reads a study: finds the file, applies the overrides, checks all of it; and writes the effective study as TOML."""
 
 import contextlib
+import copy
 import json
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from importlib import resources
 from pathlib import Path
@@ -13,15 +14,17 @@ from pydantic import BaseModel
 
 from solver.settings import FOLLOWED, Followed, FollowedFrequency
 from studies.hdf5 import is_hdf5
+from studyrunner.coordinates import COORDINATES
 from studyrunner.scatter import flat_table
 from studyrunner.study import scene_axes, sections
+from studyrunner.study.design import Design, read_archived_design, read_design
 from studyrunner.study.mistakes import check_tables, keys_as_given, nearest_name, raise_wrong
-from studyrunner.study.parts import with_room_for_wear
+from studyrunner.study.room import with_room_for_wear
 from studyrunner.study.rules import broken_rules
 from studyrunner.study.scene_section import WORN_AXIS, Origin, SceneSection, find_scene, parameters_of, read_worn
 from studyrunner.study.study import MODES, Study
 from studyrunner.study.text import format_toml, read_archived, read_toml
-from studyrunner.user_error import UserError
+from studyrunner.user_error import UserError, Verbatim
 from studyrunner.values import listed
 from studyrunner.variables import FOLLOWED_FREQUENCY
 
@@ -29,35 +32,56 @@ _IDLE_FREQUENCY = 1.0  # Hz, where no point has a frequency of the axis
 _INSTEAD = {"axes.frequency": "frequency_ratio", "axes.frequency_ratio": "frequency"}
 """Keys that stand in each other's place."""
 
+_NO_COLUMNS = ("model", "worn", "mode", "modal_amplitude")
+"""Names that no column of a design has: each point has whole modes, over their amplitude."""
+
 _ON_REQUEST = ("scatter", "loading")
 
 
-def read_study(study: str | Path, overrides: Sequence[str] | Mapping[str, object] = ()) -> Study:
+def read_study(study: str | Path, overrides: Sequence[str] | Mapping[str, object] = (), points: object = None) -> Study:
     """Read and check a study; every default is filled in.
 
     study: path of a TOML file or of a result file, or the name of a bundled study. overrides: values of keys by their
     dotted names, as `{"slow_time.cycles": 1e4, "axes.frequency": [210.0, 210.5]}`, where numpy arrays and tuples stand
-    for lists; or texts KEY=VALUE, where VALUE is TOML or a bare word.
+    for lists, and None leaves a key out, as "points" the design of a result; or texts KEY=VALUE, where VALUE is TOML or
+    a bare word. points: a table with a row a point, and columns in place of the axes that they are named as, in a file
+    or as `read_design` takes it.
 
     Raises UserError where there is no such study or something in it is wrong: a line for each mistake.
     """
     source = str(study)
     path = _study_path(source)
-    archived, scene = None, None
+    archived, scene, design, before = None, None, None, ""
     try:
         if is_hdf5(path):
             archived = read_archived(path, source)
             table = read_toml(archived.study.encode(), source)
-            scene = _scene_of_result(table, source) if archived.holds_scene else None
+            columns = cast("Any", table.pop("points", {})).get("columns")
+            design = read_archived_design(path, source, columns) if columns else None
+            whole = _with_design(table, design)
+            scene = _scene_of_result(whole, source, design) if archived.holds_scene else None
+            before = _about_scenes(_tables_of(whole, source))
         else:
             table = read_toml(path, source)
     except OSError as error:
         raise UserError(source, "the file", None, f"give a file that can be read: {error.strerror}") from None
-    before = None if archived is None else _about_scenes(_tables_of(table, source))
-    _override(table, overrides)
+    if points is not None or (isinstance(overrides, Mapping) and "points" in overrides):
+        design = None if points is None else read_design(points)
+    _override(table, overrides, design)
+    table = _with_design(table, design)
     if archived is not None and _about_scenes(_tables_of(table, source)) != before:
         archived = replace(archived, scene_sha256=None)
-    return _check_study(table, Origin(source, path, archived, scene))
+    with contextlib.nullcontext() if design is None else design.errors():
+        found = _check_study(table, Origin(source, path, archived, scene), design)
+        return found if design is None else _with_units(found, design)
+
+
+@contextlib.contextmanager
+def keys_in_file(study: Study) -> Iterator[None]:
+    """A UserError that is raised inside names keys as the file of the study, or its design, has them."""
+    of_design = contextlib.nullcontext() if study.design is None else study.design.errors()
+    with of_design, keys_as_given(scene_axes.keys_below_axes(study.scene_axes)):
+        yield
 
 
 def bundled_studies() -> tuple[str, ...]:
@@ -98,16 +122,17 @@ def _about_scenes(tables: scene_axes.Tables) -> str:
     return json.dumps([scene, keys, tables.get("scatter")], sort_keys=True, default=str)
 
 
-def _scene_of_result(table: Mapping[str, object], source: str) -> SceneSection:
+def _scene_of_result(table: Mapping[str, object], source: str, design: Design | None) -> SceneSection:
     """The scene of the study of a result that keeps its reduced model: one for all values of axes."""
     tables = _tables_of(table, source)
     model, _ = tables["scene"].pop("model", None), tables["scene"].pop("worn", None)
     kind = parameters_of(model, source)
-    given = next(scene_axes.variants_of(tables, scene_axes.take_axes(tables, kind, source)))["scene"]
+    axes = scene_axes.take_axes(tables, kind, source, design)
+    given = next(scene_axes.variants_of(tables, axes, design))["scene"]
     return SceneSection(model=model, parameters=check_tables({"scene": kind}, {"scene": given}, source)["scene"])
 
 
-def _check_study(table: Mapping[str, object], origin: Origin) -> Study:
+def _check_study(table: Mapping[str, object], origin: Origin, design: Design | None) -> Study:
     """The study in a table as TOML has it, every default filled in.
 
     Raises UserError with all that is wrong in single tables; where nothing is, with all that does not fit together.
@@ -117,13 +142,13 @@ def _check_study(table: Mapping[str, object], origin: Origin) -> Study:
     kind = parameters_of(model, source, origin.path.parent if origin.archived is None else None)
     worn = None if worn is None else read_worn(worn, source, origin.path.parent)
     solver_axes = tuple(key for key in sections.SOLVER_AXES if key in tables["axes"])
-    axes = scene_axes.take_axes(tables, kind, source)
+    axes = scene_axes.take_axes(tables, kind, source, design)
     blocks = sections.read_blocks(tables.pop("mission"), kind, source) if "mission" in tables else ()
     if any(each in FOLLOWED for each in listed(tables["axes"].get("frequency"))):
         tables.setdefault("loading", {})
     kinds: dict[str, type[BaseModel]] = {name: each for name, each in sections.SECTIONS.items() if name in tables}
     with keys_as_given({**scene_axes.keys_below_axes(axes), **{f"solver.{key}": f"axes.{key}" for key in solver_axes}}):
-        variants, studies = [*scene_axes.variants_of(tables, axes)], list[Study]()
+        variants, studies = [*scene_axes.variants_of(tables, axes, design)], list[Study]()
         given_tables = check_tables({**kinds, "scene": kind}, {**tables, **variants[0]}, source)
         worn_axis: tuple[scene_axes.SceneAxis, ...] = ()
         if worn is not None and worn.cycle:
@@ -131,7 +156,7 @@ def _check_study(table: Mapping[str, object], origin: Origin) -> Study:
             meaning = "number of vibration cycles that have worn the joint before"
             worn_axis = (scene_axes.SceneAxis(name, "scene", ("worn",), worn.cycle, "1", meaning),)
         fixed = {"mission": blocks, "source": source, "folder": origin.path.parent, "archived": origin.archived}
-        fixed |= {"solver_axes": solver_axes, "scene_axes": (*axes, *worn_axis)}
+        fixed |= {"solver_axes": solver_axes, "scene_axes": (*axes, *worn_axis), "design": design}
         for given in variants:
             checked = check_tables({"scene": kind, "wear": sections.WearSection}, given, source)
             for state in (None,) if worn is None else worn.states():
@@ -139,12 +164,12 @@ def _check_study(table: Mapping[str, object], origin: Origin) -> Study:
                 known = studies[0].scene if studies else None
                 own = {"scene": find_scene(scene, origin, known), "wear": checked["wear"]}
                 study = Study.model_construct(**{**given_tables, **fixed, **own})
-                raise_wrong(source, broken_rules(study))
-                study = study.model_copy(update={"scene_axes": ()})
+                raise_wrong(source, broken_rules(study, first=not studies))
+                study = study.model_copy(update={"scene_axes": (), "design": None})
                 studies.append(_complete(_with_block_studies(study, given["scene"], origin)))
     study = studies[0]
-    if found := (*scene_axes.as_checked(axes, study), *worn_axis):
-        study = study.model_copy(update={"scene_axes": found, "variants": tuple(studies)})
+    if (found := (*scene_axes.as_checked(axes, study), *worn_axis)) or design is not None:
+        study = study.model_copy(update={"scene_axes": found, "variants": tuple(studies), "design": design})
     return study
 
 
@@ -207,13 +232,14 @@ def format_study(study: Study) -> str:
     tables["scene"] = {"model": study.scene.model, **kept, "worn": _worn_states(study)}
     used = {*study.own_axes, "modal_amplitude", "frequency_ratio"}
     used -= set() if study.axes.frequency_ratio is None else {"frequency"}
+    designed = {} if study.design is None else study.design.columns
     axes = tables["axes"] = {name: values for name, values in tables["axes"].items() if name in used}
     if study.follow is not None:
         axes["frequency"] = study.follow.of
     for axis in study.scene_axes:
         if axis.key == ("worn",):
             continue
-        given, place = tables[axis.table], axes
+        given, place = tables[axis.table], {} if axis.name in designed else axes
         for name in axis.key[:-1]:
             given, place = scene_axes.only_table(given[name]), place.setdefault(name, {})
         del given[axis.key[-1]]
@@ -221,12 +247,28 @@ def format_study(study: Study) -> str:
     for key in sections.SOLVER_AXES:
         if key in study.own_axes:
             axes[key] = tables["solver"].pop(key)
+        elif key in designed:
+            del tables["solver"][key]
         else:
             (tables["solver"][key],) = tables["solver"][key]
     for table in ("slow_time", "wear"):
         for key in study.kind.unused.get(table, ()):
             del tables[table][key]
+    if study.design is not None:
+        tables["axes"] = {name: values for name, values in axes.items() if name not in designed}
+        tables["points"] = {"columns": [column.key for column in designed.values()]}
     return format_toml(tables)
+
+
+def _with_units(study: Study, design: Design) -> Study:
+    """The study, once it is known that units in headers of a design are those of the axes."""
+    of_scenes = {axis.name: axis.units for axis in study.scene_axes}
+    for name, column in design.columns.items():
+        units = of_scenes.get(name) or COORDINATES[name].units
+        if column.unit is not None and column.unit not in (units, *(("", "-") if units == "1" else ())):
+            remedy = f"give the column in {'no unit' if units == '1' else units}, or without a unit"
+            raise UserError(design.source, f"column {column.key}", Verbatim(f"[{column.unit}]"), remedy)
+    return study
 
 
 def _worn_states(study: Study) -> dict[str, object] | None:
@@ -243,8 +285,14 @@ def _worn_states(study: Study) -> dict[str, object] | None:
 # --- overrides ---
 
 
-def _override(table: scene_axes.Tables, overrides: str | Sequence[str] | Mapping[str, object]) -> None:
-    """Sets keys of a study. overrides: as in `read_study`; a value None leaves a key out. Raises UserError."""
+def _override(
+    table: scene_axes.Tables, overrides: str | Sequence[str] | Mapping[str, object], design: Design | None
+) -> None:
+    """Sets keys of a study. overrides: as in `read_study`; a value None leaves a key out.
+
+    Raises UserError, also where a key is a column of the design.
+    """
+    columns = () if design is None else tuple(column.key for column in design.columns.values())
     if isinstance(overrides, Mapping):
         source, option, given = "overrides", "", [(key, _as_toml(value)) for key, value in overrides.items()]
     else:
@@ -254,6 +302,30 @@ def _override(table: scene_axes.Tables, overrides: str | Sequence[str] | Mapping
         if not isinstance(key, str) or not all(key.split(".")) or not _set_key(table, key, value):
             remedy = "give the dotted name of a key in a table, that of a block with the name of the block"
             raise UserError(source, f"{option}{key}", value, remedy)
+        if key.partition(".")[2] in columns and design is not None:
+            raise UserError(source, f"{option}{key}", value, f"leave it out: it is a column of {design.source}")
+
+
+def _with_design(given: Mapping[str, object], design: Design | None) -> scene_axes.Tables:
+    """A study with the columns of a design as axes, in place of what stands there, or in the tables of their keys."""
+    table = dict(copy.deepcopy(given))
+    if design is None:
+        return table
+    for column in design.columns.values():
+        is_twice = _INSTEAD.get(f"axes.{column.key}") in design.columns
+        if is_twice or column.key in _NO_COLUMNS or not _set_key(table, f"axes.{column.key}", column.values):
+            remedy = "leave it out: give it in the study, and of frequency and frequency_ratio one"
+            raise UserError(design.source, f"column {column.key}", None, remedy)
+        words = [value for value in column.values if isinstance(value, str)]
+        if words and column.key == "frequency":
+            remedy = "give Hz: what follows a resonance stands under [axes] of the study, for all points"
+            raise design.located(UserError(design.source, "axes.frequency", words[0], remedy))
+        first, *inner = column.key.split(".")
+        for name in ("scene", "wear") if inner else ():
+            own = scene_axes.only_table(cast("Any", table.get(name, {})).get(first))
+            if isinstance(own, dict):
+                own.pop(inner[0], None)
+    return table
 
 
 def _set_key(table: scene_axes.Tables, key: str, value: object) -> bool:

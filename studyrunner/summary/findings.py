@@ -13,9 +13,9 @@ import numpy as np
 import xarray as xr
 
 from solver.outcome import SENSITIVE_ERROR, Outcome, absolute
+from studyrunner.coordinates import POINT, SAMPLE
 from studyrunner.result.pairs import contact_pairs, has_depths, last_depth
 from studyrunner.result.view import NO_MOTION, NO_VOLUME, Point, Result
-from studyrunner.statistics.samples import SAMPLE
 from studyrunner.statistics.study_statistics import describe_ranking, describe_volumes
 from studyrunner.system.progress import count
 from studyrunner.units import scale_for, show_cycles, show_known, show_number, show_percent
@@ -232,7 +232,8 @@ def _peak(result: Result, point: Point, of: int) -> tuple[float, float]:
 
 def _mode_ranges(result: Result) -> Iterator[Finding]:
     """Of each mode the ends of natural frequency and damping ratio over the points where it was found."""
-    numbers = [name for name in result.varying if name != "mode" and result.dataset[name].dtype.kind in "iuf"]
+    varying = [name for name in result.varying if name not in ("mode", POINT)]
+    numbers = [name for name in varying if result.dataset[name].dtype.kind in "iuf"]
     ends = {name: [show_number(float(result.dataset[name].values[place])) for place in (0, -1)] for name in numbers}
     over = ", ".join(f"{name.replace('_', ' ')} {' to '.join(each)}" for name, each in ends.items())
     axis, shown = result.axes.index("mode"), {"natural_frequency": (1.0, 6, " Hz"), "damping_ratio": (100.0, 3, " %")}

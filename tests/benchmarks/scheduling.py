@@ -143,7 +143,7 @@ class MemoryIndex:
         self.plan = replace(
             plan,
             sweeps=tuple(replace(task, key=f"sweep {task.number}") for task in plan.sweeps),
-            results=tuple(replace(task, key=str(task.number)) for task in plan.results),
+            make=[replace(task, key=str(task.number)) for task in plan.results].__iter__,
         )
 
     def sweeps_left(self) -> list[Task]:

@@ -14,7 +14,7 @@ from solver.results.history import StartState
 from solver.settings import Resolution
 from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.checkpoint.store import Store
-from studyrunner.kinds.task import Index, PointResult, Result, StartResult, Task, TaskPlan
+from studyrunner.kinds.task import PointResult, Result, StartResult, Task, TaskPlan
 from studyrunner.kinds.wear import History, Sweep
 from studyrunner.plan import build_tasks
 from studyrunner.scene.scene import SceneFacts
@@ -105,8 +105,8 @@ def started(plan: TaskPlan) -> list[History]:
     ]
 
 
-def points_of(task: Task) -> list[Index]:
-    """All points that get a result from a task."""
+def points_of(task: Task) -> list[int]:
+    """Numbers of all points that get a result from a task."""
     return [point for place in task.order for point in task.points(place)]
 
 
@@ -132,7 +132,7 @@ def open_completion(study: Study, plan: TaskPlan, path: Path) -> CompletionIndex
 
 
 def fake_completion(
-    study: Study, plan: TaskPlan, results: Iterable[tuple[tuple[Index, ...], PointResult]], path: Path
+    study: Study, plan: TaskPlan, results: Iterable[tuple[tuple[int, ...], PointResult]], path: Path
 ) -> CompletionIndex:
     """The file of a run that had these results, each with its points, and no others, some in a transaction."""
     completion = open_completion(study, plan, path)

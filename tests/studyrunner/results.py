@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from solver.outcome import Outcome
 from studyrunner.coordinates import COORDINATES
-from studyrunner.kinds.task import Index, PointResult
+from studyrunner.kinds.task import PointResult
 from studyrunner.result.arrays import attributes, coordinates
 from studyrunner.result.provenance import describe_run
 from studyrunner.result.view import Result, open_for_report
@@ -275,7 +275,9 @@ def mesh_file() -> xr.Dataset:
 # --- of a study ---
 
 
-def result_of_study(study: Study, facts: SceneFacts = FACTS, **given: Callable[[Index], object]) -> xr.Dataset:
+def result_of_study(
+    study: Study, facts: SceneFacts = FACTS, **given: Callable[[tuple[int, ...]], object]
+) -> xr.Dataset:
     """A result of a study whose points are all computed to the end, without wear, slip and errors.
 
     given: for variables by name, from the index of a point along the axes to its values.
@@ -300,15 +302,17 @@ def build_dataset(study: Study, facts: SceneFacts, results: Sequence[PointResult
     variables = {**study.recorded, **study.kind.always}
     dataset = _empty(axes, sizes, variables)
     dataset["outcome"].values[...] = Outcome.CONVERGED
-    for result, point in [(each, point) for points, each in results for point in points]:
+    shape = dataset["outcome"].shape
+    for result, point in [(each, np.unravel_index(number, shape)) for numbers, each in results for number in numbers]:
         for name, values in result.values.items():
             if name in LOOPS:
                 dataset[name].values[point][:, list(study.outputs.loops)] = values
             elif name in dataset:
                 dataset[name].values[point] = values
+    scenes = find_scenes(study)
     coords = {
         array.name: xr.Variable(array.dimensions, array.values, attributes(array.name, array.entry))
-        for array in coordinates(study, [facts], find_scenes(study))
+        for array in coordinates(study, [facts] * len(scenes.studies), scenes)
     }
     return dataset.assign_coords(coords).assign_attrs({**describe_run(study, facts), POINTS_LEFT: np.int32(0)})
 

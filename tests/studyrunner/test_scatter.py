@@ -7,11 +7,12 @@ import pytest
 import xarray as xr
 from scipy.stats import kstest
 
+from studyrunner.points.draw import draw_inputs
+from studyrunner.points.table import points_of
 from studyrunner.result.arrays import sample_coordinates
 from studyrunner.scatter import ScatterSection, draw, flat_table, unit_design
 from studyrunner.scene.scene import build_study_scene, describe_scene
 from studyrunner.scene.scene_set import find_scenes
-from studyrunner.study.parts import draw_inputs, parts_of
 from studyrunner.study.study_file import read_study
 from studyrunner.values import Wrong
 from tests.studyrunner.fakes import plan_of
@@ -178,7 +179,7 @@ def test_pairs_that_differ_between_samples_have_the_dimension():
     gap = "scatter.gap={normal={std=0}, of='each pair'}"
     samples = compute("cylinder_on_flat", "w.nc", *given, "scatter.samples=2", "scatter.R={normal={std=1e-4}}", gap)
     assert samples.sample_gap.dims == ("sample", "contact")
-    gaps = [build_study_scene(each.study).contact.gap for each in parts_of(read_study("w.nc"))]
+    gaps = [build_study_scene(each).contact.gap for each in points_of(read_study("w.nc")).studies]
     np.testing.assert_array_equal(samples.sample_gap, gaps)
     assert samples.contact_x.dims == ("sample", "contact")
     assert samples.contact_exists.all()

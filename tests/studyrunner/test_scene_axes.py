@@ -38,7 +38,7 @@ def test_the_unit_of_an_axis_is_metadata_of_its_key():
 def test_each_point_of_axes_of_the_scene_is_a_study_of_its_own():
     axes = ("axes.stiffness=[1.7e5, 1.6e5]", "axes.friction_coefficient=[0.3, 0.6]")
     # friction alone builds no scene
-    assert find_scenes(read_study("sdof_slider", [*CHEAP, *axes])).numbers == (0, 0, 1, 1)
+    assert find_scenes(read_study("sdof_slider", [*CHEAP, *axes])).of_blocks == ((0,), (0,), (1,), (1,))
     whole = compute("sdof_slider", "whole.nc", *CHEAP, EXACT, *axes)
     assert whole.worn_volume.dims[5:] == ("sweep", "stiffness", "friction_coefficient", "cycle")
     assert whole.friction_coefficient.attrs["long_name"] == "Coulomb friction coefficient"

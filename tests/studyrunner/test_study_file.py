@@ -195,7 +195,7 @@ def test_a_new_study_is_planned_and_its_comments_are_its_defaults(folder):
     shown = re.sub(r"^# (\w+ = )", r"\1", body, flags=re.M)
     assert len(read_toml(shown.encode(), "")["solver"]) == 5
     assert format_study(read(shown)) == format_study(study)
-    assert read(body + ("[scatter]" + scatter).replace("\n# ", "\n")).dimensions["sample"] == tuple(range(16))
+    assert read(body + ("[scatter]" + scatter).replace("\n# ", "\n")).dimensions["sample"] == range(16)
     shutil.copy(SECTOR, "sector.inp")
     assert main(["--new", "root", "--from", "sector.inp"]) == 0
     assert read_study("root.toml").axes.frequency_ratio == (0.99, 1.0)

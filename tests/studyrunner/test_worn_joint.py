@@ -12,12 +12,13 @@ from solver.outcome import Outcome
 from studies import build_scene, read_scene
 from studyrunner import UserError, compute_worn_joint, read_study, run_study
 from studyrunner.cli import main
+from studyrunner.points.table import points_of
 from studyrunner.report import cli as report
 from studyrunner.report import contents
 from studyrunner.scene.answers import write_study_scene
 from studyrunner.scene.scene import build_study_scene, describe_scene
 from studyrunner.scene.scene_set import find_scenes
-from studyrunner.study.parts import expected_wear, parts_of
+from studyrunner.study.room import expected_wear
 from studyrunner.study.study_file import format_study
 from tests.mpi.launching import options, results
 from tests.studyrunner.small_studies import compute
@@ -161,7 +162,7 @@ def test_a_scene_has_room_for_nearly_all_samples_whatever_their_number(sliding):
     assert expected_wear(study).per_slip_work == pytest.approx(1.5**3.1 * 1e-13 * 2000)
     assert half_width(study) > half_width(read_study(sliding))
     assert half_width(read_study(sliding, {"scatter": {**scatter, "samples": 1024}})) == half_width(study)
-    widths = {half_width(part.study) for part in parts_of(study)}
+    widths = {half_width(part) for part in points_of(study).studies}
     assert widths == {half_width(study)}
     # one scene for all
     assert len(find_scenes(study).studies) == 1
@@ -170,10 +171,10 @@ def test_a_scene_has_room_for_nearly_all_samples_whatever_their_number(sliding):
 def test_each_sample_with_a_scene_of_its_own_has_room_for_its_wear(sliding):
     inputs = {name: {"lognormal": {"factor": 1.5}} for name in ("P", "wear_coefficient")}
     study = read_study(sliding, {"scatter": {"samples": 8, **inputs}})
-    for part in parts_of(study):
-        own = {"scene.P": dict(part.study.scene.parameters)["P"]}
-        alone = read_study(sliding, {**own, "axes.wear_coefficient": part.study.axes.wear_coefficient[0]})
-        assert half_width(part.study) == half_width(alone)
+    for part in points_of(study).studies:
+        own = {"scene.P": dict(part.scene.parameters)["P"]}
+        alone = read_study(sliding, {**own, "axes.wear_coefficient": part.axes.wear_coefficient[0]})
+        assert half_width(part) == half_width(alone)
 
 
 @pytest.mark.slow

@@ -12,19 +12,20 @@ from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.patches import Patch
 
 from solver.outcome import Outcome, absolute
+from studyrunner.coordinates import POINT, SAMPLE
 from studyrunner.report import drawing as plot
 from studyrunner.report.drawing import COLOURS, Drawn, FloatArray, Table, as_sentences
 from studyrunner.report.selection import choose, find_course, slow_time, spans_decades
 from studyrunner.result.opening import describe_outcome
 from studyrunner.result.view import NO_VOLUME, Result
-from studyrunner.statistics.samples import SAMPLE
 from studyrunner.statistics.study_statistics import describe_ranking, measure_of
 from studyrunner.system.progress import count
-from studyrunner.units import Scale, scale_for, show_cycles, show_number, units_of
+from studyrunner.units import Scale, scale_for, show_cycles, show_known, show_number, units_of
 from studyrunner.variables import CERTIFICATE
 
-_PLAIN = ("frequency", "scheme", SAMPLE)
+_PLAIN = ("frequency", "scheme", SAMPLE, POINT)
 _MOST_AXES, _SMALL = 6, 7.5
+_MOST_POINTS = 200  # in the table
 _LONG = 9  # characters that stand side by side under a small panel
 _MOST_ROWS, _MOST_CELLS, _LABEL_WIDTH = 24, 400, 20
 _MOST_PANELS, _MOST_LINES = 4, 3  # of samples
@@ -46,11 +47,11 @@ _CONVERGED_COLOUR, _OTHERS = "#dfe7ef", (COLOURS[1], COLOURS[0], *COLOURS[2:], "
 def draw_trends(result: Result) -> Drawn:
     """Small multiples: one row a quantity, one column an axis. Nothing where only frequency and scheme vary."""
     quantities = [each for each in _find_quantities(result) if np.isfinite(each[2]).any()]
-    if not quantities or all(name in _PLAIN for name in result.varying):
+    if not quantities or (all(name in _PLAIN for name in result.varying) and not result.designed):
         return None
     # the last of many are the first to go
-    axes = [name for name in result.varying if name != SAMPLE][:_MOST_AXES]
-    left = [name.replace("_", " ") for name in result.varying if name not in (*axes, SAMPLE)]
+    varying = [*result.designed, *(name for name in result.varying if name not in (POINT, SAMPLE))]
+    axes, left = varying[:_MOST_AXES], [name.replace("_", " ") for name in varying[_MOST_AXES:]]
     figure, panels = plot.new_panels(len(quantities), len(axes), 0.5 + 1.35 * len(quantities), sharey="row")
     for row, (label, units, values, errors) in zip(panels, quantities, strict=True):
         scale = scale_for(units, values)
@@ -60,6 +61,27 @@ def draw_trends(result: Result) -> Drawn:
     plot.label_outer(panels)
     through = f"Blue: through {result.describe(result.shown)}, where most is worn; grey: all other combinations"
     return figure, through, f"Left out: {', '.join(left)}" if left else ""
+
+
+def list_points(result: Result) -> Drawn:
+    """The points of a design, each with its columns, what came out in the end, and how it ended."""
+    if not result.designed:
+        return None
+    choice, n_shown = choose(result, [POINT], 1), min(result.dataset.sizes[POINT], _MOST_POINTS)
+    through = tuple(slice(n_shown) if name == POINT else choice.points[0][name] for name in result.axes)
+    columns = {POINT: [str(place) for place in range(n_shown)]}
+    for name in result.designed:
+        array = result.dataset[name]
+        texts = [each if isinstance(each, str) else show_number(float(each)) for each in array.values[:n_shown]]
+        columns[Scale(1.0, units_of(array)).label(name.replace("_", " "))] = texts
+    for label, units, *arrays in _find_quantities(result):
+        scale, (values, errors) = scale_for(units, arrays[0]), (each[through].tolist() for each in arrays)
+        pairs = zip(values, errors, strict=True)
+        texts = [scale.show(value) + (show_known(error / value) if value > 0.0 else "") for value, error in pairs]
+        columns[label.replace("\n", " ")] = texts
+    columns["ended"] = [describe_outcome(each)[0] for each in result.dataset["outcome"].values[through].tolist()]
+    more = f"The first {n_shown} of {result.dataset.sizes[POINT]} points" * (n_shown < result.dataset.sizes[POINT])
+    return Table(tuple(columns), tuple(zip(*columns.values(), strict=True)), as_sentences(choice.sentence, more))
 
 
 def _find_quantities(result: Result) -> list[tuple[str, str, FloatArray, FloatArray]]:
@@ -77,15 +99,19 @@ def _find_quantities(result: Result) -> list[tuple[str, str, FloatArray, FloatAr
 
 
 def _draw_trend(panel: Axes, result: Result, name: str, values: FloatArray, errors: FloatArray) -> None:
-    """A quantity (axes...), as shown, along an axis, through the shown point and all others."""
-    axis, places = result.axes.index(name), result.dataset[name].values
+    """A quantity (axes...), as shown, along an axis or over a column of a design, at the shown point and all others."""
+    along, places = POINT if name in result.designed else name, result.dataset[name].values
     words = places.dtype.kind not in "fiu"
-    order = np.arange(len(places)) if words else np.argsort(places, kind="stable")
-    at = order.astype(float) if words else places[order].astype(float)
-    drawn, wrong = (np.moveaxis(each, axis, 0)[order] for each in (values, errors))
-    through: Any = (slice(None), *(result.shown[other] for other in result.axes if other != name))
-    panel.plot(at, drawn.reshape(len(order), -1), color="0.72", linewidth=0.6, zorder=1)
+    # the words of an axis differ, those of a column come again
+    ticks, at_tick = np.unique(places, return_inverse=True) if along == POINT else (places, np.arange(len(places)))
+    order = np.argsort(at_tick if words else places, kind="stable")
+    at = (at_tick if words else places)[order].astype(float)
+    drawn, wrong = (np.moveaxis(each, result.axes.index(along), 0)[order] for each in (values, errors))
+    through: Any = (slice(None), *(result.shown[other] for other in result.axes if other != along))
+    marks: dict[str, Any] = {"linestyle": "none", "marker": "."} if along == POINT else {"linewidth": 0.6}
+    panel.plot(at, drawn.reshape(len(order), -1), color="0.72", zorder=1, **marks)
     look: dict[str, Any] = {"color": COLOURS[0], "marker": "o", "markersize": 3.5, "zorder": 3, "label": "shown point"}
+    look |= {"linestyle": "none"} if along == POINT else {}
     plot.add_line(panel, at, drawn[through], wrong[through], **look)
     panel.set_ylim(bottom=0.0)
     units = units_of(result.dataset[name])
@@ -94,10 +120,11 @@ def _draw_trend(panel: Axes, result: Result, name: str, values: FloatArray, erro
     panel.tick_params(labelsize=_SMALL)
     if not words and name != "frequency" and spans_decades(at):
         plot.set_log(panel.xaxis, float(at[0]), float(at[-1]))
-    elif words or len(at) <= 3:
-        texts = [str(each) if words else show_number(float(each), 4) for each in places[order]]
+    elif words or len(ticks) <= 3:
+        texts = [str(each) if words else show_number(float(each), 4) for each in ticks]
         turned: dict[str, Any] = {"rotation": 35, "ha": "right", "rotation_mode": "anchor"}
-        panel.set_xticks(at, texts, **(turned if sum(map(len, texts)) > _LONG else {}))
+        where = np.arange(len(ticks)) if words else ticks
+        panel.set_xticks(where, texts, **(turned if sum(map(len, texts)) > _LONG else {}))
         panel.margins(x=0.15)
     else:
         panel.locator_params(axis="x", nbins=3)
