@@ -238,13 +238,13 @@ def test_pairs_of_a_mixed_joint_are_as_they_are_alone(resolution, friction):
     predicted[~joint.contact.has_normal, 0, 1:] = 0.0
     predicted[:, 0, 0] = PRELOAD
     history = random.normal(size=(6, 2)) * 0.1 * PRELOAD / joint.penalty.tangential[:, None]
-    together = joint.law.march(predicted, history)
+    together = joint.law.march(predicted, history, None)
     assert {SEPARATED, STICK, SLIP} <= set(together.status_t[FREE].ravel())
     assert {STICK, SLIP} <= set(together.status_t[ELASTIC].ravel())
     tangents = joint.law.tangent(together)
     for pairs in (FREE, ELASTIC, *([pair] for pair in range(6))):
         part = of_pairs(joint, pairs)
-        alone = part.march(predicted[pairs], history[pairs])
+        alone = part.march(predicted[pairs], history[pairs], None)
         for name in ("status_t", "periods"):
             assert np.array_equal(getattr(together, name)[pairs], getattr(alone, name)), name
         # a product of matrices of another height may differ in its last digit
