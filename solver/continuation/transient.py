@@ -115,7 +115,7 @@ def relax_to_periodic(
     at = f"at {joint.omega / (2.0 * np.pi):.6g} Hz"
     budget.report(f"{at}, where the vibration is left to settle in time")
     transient = Transient(joint)
-    begun, history = Transient(start_joint).periodic(start.evaluation).displacement, start.history
+    begun, history = Transient(start_joint).periodic(start.evaluation).displacement, start.next_history
     # amplitudes of a periodic motion that are constant at the frequency of this joint
     motion = Motion(begun, transient.rates[:, None] * begun)
     predicted, period = start.evaluation.predicted_h, 2.0 * np.pi / joint.omega
@@ -141,7 +141,7 @@ def relax_to_periodic(
         if end is None or too_far or damped:
             length *= TRANSIENT_CUT
             continue
-        motion, predicted, history = ahead, end.evaluation.predicted_h, end.history
+        motion, predicted, history = ahead, end.evaluation.predicted_h, end.next_history
         moved = np.abs(end.evaluation.displacement_h)
         size = max(size, float(moved[:, :, 1:].max()))
         if moved[:, :, 0].max() > RUNAWAY * size:

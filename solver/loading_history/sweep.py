@@ -307,13 +307,13 @@ def follow(
 class EarlierSweep:
     """A sweep to be made again at other depths. With other nodes, the wear would jump from depth to depth by its error.
 
-    nodes: frequencies, rad/s, or load factors of its nodes, none if lost; of a passage the frequencies that count, Hz.
-    start, resolution: state at its end, and harmonics and samples of the last node; None for a passage.
+    nodes: parameters of its nodes, none if lost. start, resolution: state at its end, and harmonics and samples of the
+    last node.
     """
 
     nodes: tuple[float, ...]
-    start: StartState | None = None
-    resolution: Resolution | None = None
+    start: StartState
+    resolution: Resolution
 
     def again(self, path: LoadingPath, run: Run, stride: int, *, with_switching: bool) -> StartState | None:
         """The state at the end, with the errors of the earlier one; None where the sweep has jumped over a fold, there
@@ -324,11 +324,11 @@ class EarlierSweep:
         path: with harmonics and samples of the state. stride: nodes in a step. with_switching: as `find_instability`.
         """
         start = self.start
-        if start is None or start.state is None or start.branch > 0:
+        if start.state is None or start.branch > 0:
             return None
         target = start.state.omega if path.omega is None else 1.0
         known, history = evaluated(path.case, start.state), start.state.start_history
-        before = replace(known, history=history, parameter=target)
+        before = replace(known, next_history=history, parameter=target)
         try:
             state, most = path.solve((before,), target, run) if path.forgets(before) else None, SMOOTH_CHANGE
             if state is None or not path.forgets(state):
@@ -343,7 +343,7 @@ class EarlierSweep:
 
     def _over_nodes(self, path: LoadingPath, target: float, run: Run, stride: int) -> State | None:
         """The state at a target of the path, over the nodes; None where it is not found."""
-        if not self.nodes or self.resolution is None:
+        if not self.nodes:
             return None
         coarse, (first, *nodes) = path.at(self.resolution), self.nodes[::stride]
         joint = coarse.joint_at(first)

@@ -26,6 +26,11 @@ from solver.wear.slow_time import Guide, Integrator
 from solver.wear.step import rate_slope
 from solver.wear.wearing_joint import WearingJoint, WearRequest, WearState
 
+Earlier = EarlierSweep | tuple[float, ...] | None
+"""What a block of the mission before leaves: its sweep, or the frequencies of a passage that count, Hz; None for one
+that continues.
+"""
+
 
 @dataclass(frozen=True)
 class BlockResult:
@@ -37,7 +42,7 @@ class BlockResult:
     response_error, growth_error: estimated relative errors.
     inaccurate: largest relative error of a state above rtol, 0 where there is none, inf where stability is not known.
     held, cut_off: whether a joint that slides as a whole was held, or a pair at an edge of the contact carries load.
-    guide, sweep: what the reference solution takes over, and the next mission (None for a block that continues).
+    guide, sweep: what the reference solution takes over, and the next mission.
     last: the state at the end, which a block that continues solves again; `start_history` is that which it leaves.
     iterations: of Newton's method, start state included.
     sweep_rate: |df/dt| / (zeta f)^2 of a passage; 0 for steady vibration.
@@ -54,7 +59,7 @@ class BlockResult:
     cut_off: bool = False
     guide: Guide | None = None
     last: StartState | None = None
-    sweep: EarlierSweep | None = None
+    sweep: Earlier = None
     iterations: int = 0
     sweep_rate: float = 0.0
 
@@ -76,7 +81,7 @@ class BlockInput:
     depth: FloatArray
     deadline: float = math.inf
     before: StartState | None = None
-    earlier: EarlierSweep | None = None
+    earlier: Earlier = None
     guide: Guide | None = None
     with_slope: bool = False
     with_switching: bool = True
@@ -141,7 +146,7 @@ def run_block(given: BlockInput) -> BlockResult | Failure:
         slope = np.asarray(scipy.linalg.expm(counts[-1] * rates) - np.eye(len(rates)))
     # the errors of the first steps of the blocks have one sign and add up over the missions
     by_steps = DIFFERENCE_SAFETY * float(values["local"][-1]) / volume if volume > 0.0 else 0.0
-    motion, force, history = state.at.displacement_h, state.at.force_h, state.point.history
+    motion, force, history = state.at.displacement_h, state.at.force_h, state.point.next_history
     return BlockResult(
         growth=depth[-1],
         response=values["response"],
@@ -174,7 +179,7 @@ def find_start(given: BlockInput) -> tuple[StartState, EarlierSweep | None]:
     run = Run(given.mission.settings.tolerance, Budget(deadline=given.deadline))
     if given.before is not None:
         return _continued(given, given.before, run), None
-    if earlier is not None and earlier.start is not None:
+    if isinstance(earlier, EarlierSweep):
         omega = 2.0 * np.pi * block.ends[0] if block.way == "ramp" else None
         path = LoadingPath(given.case_of(earlier.start), block.excitation_amplitude, omega)
         stride = 1 if given.guide is None else STEPS_OF_REFERENCE

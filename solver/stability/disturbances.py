@@ -116,7 +116,7 @@ def build_monodromy(joint: Joint, at: Evaluation, n_samples: int, n_sectors: int
     """
     steps = -(-n_samples // n_sectors)
     fine = replace(joint, basis=build_basis(joint.basis.orders, steps * n_sectors))
-    state = Balance(fine, at.history, at.wear_depth).evaluate(at.predicted_h)
+    state = Balance(fine, at.start_history, at.wear_depth).evaluate(at.predicted_h)
     switching, stuck = switching_pairs(state)
     dofs, moves = joint.contact.dofs, moving(joint, stuck)
     mass, damping, stiffness = _of_sectors(joint.model, moves, n_sectors)
@@ -203,7 +203,7 @@ def hill_multipliers(joint: Joint, at: Evaluation) -> ComplexArray:
     if (2 * n + n_rel) * m > EXPENSIVE_UNKNOWNS:
         return np.empty(0, np.complex128)
     fine = replace(joint, basis=build_basis(joint.basis.orders, HILL_SAMPLES))
-    balance = Balance(fine, at.history, at.wear_depth)
+    balance = Balance(fine, at.start_history, at.wear_depth)
     tangent = balance.linearise(balance.evaluate(at.predicted_h))
     size = float(np.abs(linear.stiffness).max())
     # time in 1 / omega, forces over the largest stiffness

@@ -2,7 +2,7 @@
 
 A `StartState` of a sweep has a `PeriodicState`, which is evaluated (`WearingJoint.unworn_state`) and becomes a `State`,
 as Newton's method gives it. A `WearState` has a `State` at a cycle count, and all with which the history goes on:
-what was `Checked`, the last of the `Steps`, and the `Record` for the result.
+what was `Checked`, the `LastStep`, and the `Record` for the result.
 
 A followed frequency is an unknown with one more equation: a given phase lag of the vibration, or that of the largest
 amplitude (`solver.continuation.phase_lag`).
@@ -104,15 +104,12 @@ class Checked:
 
 @packable
 @dataclass(frozen=True)
-class Steps:
-    """The last step: the state before it, None at the first state and after a jump, its length, cycles, and its local
-    error, m3; and the largest length of the next one.
-    """
+class LastStep:
+    """The state before a step, None at the first state and after a jump; length, cycles, and local error, m3."""
 
     before: State | None = None
-    last: float = math.nan
+    length: float = math.nan
     error: float = 0.0
-    length: float = 1.0
 
 
 @packable
@@ -142,7 +139,7 @@ class WearState:
     """A wearing joint at one cycle count; the next step depends on this state only.
 
     cycle: count. point: periodic state with its depth and tangential history. rate (n_contact,): of its wear, m per
-    cycle. guide: for the reference solution.
+    cycle. guide: for the reference solution. next_length: largest length of the next step, cycles.
     lag, half_width: of a followed frequency: phase lag, rad, and change of the frequency over that of the lag, rad/s.
     """
 
@@ -152,7 +149,8 @@ class WearState:
     checked: Checked
     record: Record
     guide: Guide
-    steps: Steps = Steps()
+    last: LastStep = LastStep()
+    next_length: float = 1.0
     lag: float = 0.5 * math.pi
     half_width: float = 0.0
 
@@ -178,11 +176,9 @@ class WearingJoint:
     """
 
     def __init__(self, case: Case, start: StartState, request: WearRequest) -> None:
-        assert start.state is not None
         if request.steps is None:
             case = replace(case, settings=case.settings.of_steps)
-        self.case, self.start, self.request, self.follow = case, start, request, request.follow
-        self.unworn, self.area = start.state, case.model.contact.area
+        self.case, self.start, self.request, self.area = case, start, request, case.model.contact.area
         self.shifts = request.until is not None and request.until.quantity == "frequency_shift"
         self.wearing_work = wearing_work(request.law, case.model.contact)
         self.run = Run(case.settings.tolerance)
@@ -193,7 +189,7 @@ class WearingJoint:
 
     def balance_of(self, state: WearState) -> Balance:
         """The balance that a state solves at constant wear depth."""
-        return Balance(self.joint_of(state), state.at.history, state.depth)
+        return Balance(self.joint_of(state), state.at.start_history, state.depth)
 
     def gain(self, cycles: float) -> FloatArray:
         """Growth of the depth over wearing work (n_contact,), m/J, in h cycles: `h k_w / alpha`, Eqs. (7), (24)."""
@@ -202,7 +198,9 @@ class WearingJoint:
     def unworn_state(self, periodic: PeriodicState | None = None) -> WearState:
         """The state at the start, or another one with its harmonics and samples, evaluated and not solved again."""
         start, nothing = self.start, np.zeros(self.area.size + 1)
-        point = evaluated(self.case, periodic or self.unworn)
+        known = periodic or start.state
+        assert known is not None
+        point = evaluated(self.case, known)
         estimate = Estimate(start.response_error, start.wear_rate_error)
         # the stability of a start state has been checked
         judged_h, accurate = point.evaluation.predicted_h, start.outcome is Outcome.CONVERGED
@@ -246,11 +244,11 @@ class WearingJoint:
         self, balance: Balance, start: FloatArray, state: WearState, most: int = NEAR_ITERATIONS
     ) -> WearState | None:
         """The state before with the solution of a balance from a first predicted force (n_rel, 2H+1), N, or None."""
-        if self.follow is None:
+        if self.request.follow is None:
             point = self.run.state(balance, start, most=most)
             return None if point is None else self.with_rates(replace(state, point=point))
         case, lag = state.point.case(self.case), state.lag
-        if self.follow.of == "peak":
+        if self.request.follow.of == "peak":
             peak = solve_at_peak(case, balance, start, lag, self.run, most)
             solved, lag = (None, lag) if peak is None else peak
         else:
@@ -266,13 +264,13 @@ class WearingJoint:
 
     def at_followed(self, state: WearState) -> WearState | Failure:
         """The state at the frequency that is followed, with its depth and its tangential history."""
-        if self.follow is None:
+        if self.request.follow is None:
             return state
         return self.solve(self.balance_of(state), state.at.predicted_h, state, MOST_ITERATIONS) or self.lost(state)
 
     def lost(self, state: WearState) -> Failure:
         """The end of a history whose frequency leaves its range, or beyond whose last state none is found."""
-        wanted, frequency = self.follow, state.point.omega / (2.0 * math.pi)
+        wanted, frequency = self.request.follow, state.point.omega / (2.0 * math.pi)
         assert wanted is not None
         reason = "ends: no state beyond is found to go on with"
         if not wanted.low <= frequency <= wanted.high:
@@ -284,9 +282,9 @@ class WearingJoint:
         """Error of a followed frequency, Hz; 0 for a given one. The phase lag is wrong by as much as the amplitude, and
         every amplitude that is less than the largest one by its error may be the largest one.
         """
-        if self.follow is None:
+        if self.request.follow is None:
             return 0.0
         lag = state.checked.estimate.response
-        if self.follow.of == "peak":
+        if self.request.follow.of == "peak":
             lag = math.sqrt(2.0 * lag) + accepted_rise(self.case.settings.rtol)
         return state.half_width * lag / (2.0 * math.pi)

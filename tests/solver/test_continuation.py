@@ -68,7 +68,7 @@ def test_the_slope_along_a_path_is_that_of_differences(name, over):
     case, omega = case_of(scene(name), 0.5, 1.3, SolverSettings(5, 64)), 1.3
     path, place = (LoadingPath(case, 20.0), omega) if over == "frequency" else (LoadingPath(case, 1.0, omega), 20.0)
     state = first_point(case, omega, 20.0)
-    balance, length = Balance(path.joint_at(place), state.evaluation.history), 1e-5 * place
+    balance, length = Balance(path.joint_at(place), state.evaluation.start_history), 1e-5 * place
     at = balance.evaluate(state.evaluation.predicted_h)
     one, other = (
         replace(balance, joint=path.joint_at(place + step)).evaluate(at.predicted_h).residual
@@ -107,7 +107,7 @@ def test_a_motion_leaves_an_unstable_state_whose_growth_long_steps_would_damp(ch
     start = first(0.03)
     case = case_of(scene("vibro_impact"), 0.0, WALL_OMEGA, SolverSettings(5, 64))
     path = LoadingPath(case, 1.0, WALL_OMEGA)
-    arc = Arc(lambda amplitude: Balance(joint_at(amplitude), start.history), path.slope, start, 0.03, Run(1e-9))
+    arc = Arc(lambda amplitude: Balance(joint_at(amplitude), start.next_history), path.slope, start, 0.03, Run(1e-9))
     passed = ((a, b) for a, b, _ in arc.steps(1.0) if (a.parameter - 0.03) * (b.parameter - 0.03) < 0.0)
     middle = next(filter(grows, (arc.state_at(a, b, 0.03) for a, b in passed)))
     before, joint = case.joint(WALL_OMEGA, 0.03), case.joint(WALL_OMEGA, 0.03 * (1.0 + change))

@@ -97,7 +97,7 @@ def test_a_law_that_remembers_more_leaves_what_friction_remembers():
     balance, predicted = random_balance(with_springs(model, 1), SETTINGS, 104, wear=False)
     longer, _ = random_balance(with_springs(model, 1, kind=Remembering), SETTINGS, 104, wear=False)
     longer = replace(longer, history=np.pad(balance.history, ((0, 0), (0, 1))))
-    short, long = (state_of(each.joint, each.evaluate(predicted)).history for each in (balance, longer))
+    short, long = (state_of(each.joint, each.evaluate(predicted)).next_history for each in (balance, longer))
     assert long[1].tolist() == [7.0, 7.0, 7.0]
     assert np.array_equal(long[[0, 2], :2], short[[0, 2]])
     assert not long[[0, 2], 2].any()

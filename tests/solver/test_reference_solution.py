@@ -128,7 +128,7 @@ def test_a_reference_solution_that_fails_leaves_the_error_unknown(monkeypatch):
     whole, own = usual(), WearProblem.step
 
     def go_astray(of, state):
-        lost = of.steps is None and state.cycle >= 12_000.0
+        lost = of.request.steps is None and state.cycle >= 12_000.0
         return Failure(Outcome.MARCH_FAILED, "lost") if lost else own(of, state)
 
     monkeypatch.setattr(WearProblem, "step", go_astray)

@@ -65,7 +65,7 @@ def test_a_force_that_jumps_does_not_violate_the_cone_however_its_series_oversho
 @pytest.mark.parametrize("name", ["slider", "joint"])
 def test_an_unconverged_force_and_friction_that_drives_are_caught(name):
     joint, evaluation = on_branch(*SLIDER, 5) if name == "slider" else random_state()
-    balance = Balance(joint, evaluation.history, evaluation.wear_depth)
+    balance = Balance(joint, evaluation.start_history, evaluation.wear_depth)
     predicted = evaluation.predicted_h
     noise = 1e-5 * np.abs(predicted).max() * np.random.default_rng(0).normal(size=predicted.shape)
     certificate = certify(joint, balance.evaluate(predicted + noise))

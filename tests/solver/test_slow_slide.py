@@ -106,7 +106,7 @@ def test_jacobian_with_the_way_to_a_state_is_that_of_central_differences(wear):
         balance, predicted = random_balance(random_model(seed, MODELS["3d"]), SolverSettings(3, 24), seed, wear=wear)
         predicted[balance.joint.component_index % 3 == 0, 0] *= 3.0
         before = balance.evaluate(0.7 * predicted)
-        balance = replace(balance, history=before.history, first=before.predicted_t)
+        balance = replace(balance, history=before.start_history, before_t=before.predicted_t)
         at = balance.evaluate(predicted)
         if not (at.slid & (at.periods == 1)).any():
             continue

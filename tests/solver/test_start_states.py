@@ -71,9 +71,9 @@ def test_pairs_slide_with_a_rising_load_alike_in_one_step_and_in_many():
     one, many = (follow_naturally(balance_from, rest, 1.0, run, fine=fine) for fine in (1.0, 1.0 / 64.0))
     assert one[1]
     assert many[1]
-    slid = np.linalg.norm(many[0].history - rest.history)
+    slid = np.linalg.norm(many[0].next_history - rest.next_history)
     assert slid > 5e-6
-    assert np.linalg.norm(one[0].history - many[0].history) < 0.03 * slid
+    assert np.linalg.norm(one[0].next_history - many[0].next_history) < 0.03 * slid
 
 
 @pytest.mark.slow

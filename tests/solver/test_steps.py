@@ -48,7 +48,7 @@ def test_a_given_step_follows_its_own_equation(scheme):
     assert np.diff(depth) == pytest.approx(4000.0 * taken, rel=1e-9)
     # the difference to the trapezoidal rule
     expected = 0.5 * 4000.0 * np.abs(np.diff(rate)) * AREA
-    assert [state.steps.error for state in states[1:]] == pytest.approx(expected, rel=1e-9)
+    assert [state.last.error for state in states[1:]] == pytest.approx(expected, rel=1e-9)
 
 
 def test_by_the_largest_depth_every_explicit_step_wears_this_depth():
@@ -63,7 +63,7 @@ def test_adaptive_steps_are_as_exact_as_asked_for_and_no_shorter():
     at, depth, _ = read(states)
     lengths = np.diff(at)
     worn = np.maximum(np.diff(depth), depth[1:] * lengths / at[1:]) * AREA
-    assert ([state.steps.error for state in states[1:]] <= control.SMALL_SHARE * rtol * worn).all()
+    assert ([state.last.error for state in states[1:]] <= control.SMALL_SHARE * rtol * worn).all()
     assert (lengths[1:] <= LARGEST_STEP_RATIO * lengths[:-1] * (1.0 + 1e-12)).all()
     assert states_of(None, 12, 1e-4)[-1].cycle < 0.5 * at[-1]
 
@@ -81,7 +81,7 @@ def failing(monkeypatch, fails):
 
 
 def test_a_step_that_is_not_found_is_shortened_and_in_the_end_an_euler_step(monkeypatch):
-    first = states_of(None, 0)[0].steps.length
+    first = states_of(None, 0)[0].next_length
     with monkeypatch.context() as patch:
         tried = failing(patch, lambda tried: len(tried) == 1)
         states = states_of(None, 1)
@@ -99,7 +99,7 @@ def test_a_longer_step_goes_across_corners_at_which_every_short_one_ends(monkeyp
     # so short a step changes less than the tolerance
     of.run = of.run.with_tolerance(1e-10)
     first = of.with_first_length(of.unworn_state())
-    shortest = control.FINE_STEP * first.steps.length
+    shortest = control.FINE_STEP * first.next_length
 
     def fails(tried):
         """All steps up to the shortest one, the Euler step, and some longer ones behind it."""
@@ -116,7 +116,7 @@ def test_a_longer_step_goes_across_corners_at_which_every_short_one_ends(monkeyp
         assert isinstance(found, WearState)
         assert tried[-2:] == [("adaptive", 2.0 * shortest), ("adaptive", 4.0 * shortest)]
         assert found.cycle == 2.0**doublings * shortest
-        assert found.steps.error > 0.0
+        assert found.last.error > 0.0
 
 
 def test_a_given_step_that_is_not_found_is_shortened_and_later_ones_end_at_multiples_again(monkeypatch):
@@ -197,7 +197,7 @@ def test_the_derivatives_of_the_wear_are_those_of_the_solved_states():
         rates = []
         for sign in (1.0, -1.0):
             depth = at.wear_depth + sign * step * np.eye(slips.size)[pair]
-            solved = Run(1e-13).state(Balance(joint, at.history, depth), at.predicted_h)
+            solved = Run(1e-13).state(Balance(joint, at.start_history, depth), at.predicted_h)
             rates.append(gain * solved.evaluation.slip_work)
         wanted = (rates[0] - rates[1]) / (2.0 * step)
         # as exact as a Newton direction
