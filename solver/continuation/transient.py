@@ -24,7 +24,7 @@ from solver.harmonic_balance.state import Failure, State
 from solver.model import ComplexArray, FloatArray, Matrix
 from solver.newton.run import SHORTEST_STEP, Run
 from solver.outcome import Outcome
-from solver.settings import ROUND_OFF, SMALL
+from solver.settings import ROUND_OFF
 from solver.structure.condensation import condense, whole_motion
 from solver.structure.fourier import from_complex, with_static
 from solver.structure.harmonic_stiffness import DenseStiffness
@@ -38,7 +38,7 @@ SEARCH_ITERATIONS = 800
 """Most Newton iterations of a relaxation. A jump at a fold of vibro-impact takes 400 to 500; a block that does not
 settle ends after 600 to 740 by its steps."""
 
-RUNAWAY = 1.0 / SMALL
+RUNAWAY = 1e3
 """Displacement over the largest one of vibration and start; above it parts run away."""
 
 RELAXED_CHANGE = SMOOTH_CHANGE / 10.0

@@ -28,7 +28,7 @@ from solver.contact.coulomb import SEPARATED, STICK
 from solver.contact.element import SampledLaw
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.model import BoolArray, ComplexArray, FloatArray, IntArray, LinearModel, ReducedModel
-from solver.settings import FEWEST_SAMPLES, SMALL
+from solver.settings import FEWEST_SAMPLES
 from solver.structure.fourier import build_basis, derivative
 from solver.structure.joint import Joint
 
@@ -46,9 +46,9 @@ equal."""
 
 # Real part over omega from which an exponent is infinite, that of a displacement without mass made finite by round-off:
 # in random scenes from 8e10 on, those of the joint -88 to 0.
-_INFINITE = 1.0 / SMALL
+_INFINITE = 1e3
 ROUNDING = float(np.finfo(np.float64).eps)
-_HALF = 0.5 - SMALL  # imaginary part over omega from which a multiplier counts as real and negative
+_HALF = 0.499  # imaginary part over omega from which a multiplier counts as real and negative
 
 
 class Monodromy(NamedTuple):
