@@ -13,7 +13,7 @@ from solver.continuation.natural import NEAR_ITERATIONS, follow_naturally
 from solver.continuation.phase_lag import phase_lag, rise_of_response, solve_at_lag
 from solver.continuation.transient import Motion, Transient, relax_to_periodic
 from solver.harmonic_balance.dlft import Balance
-from solver.harmonic_balance.state import State, balance_after
+from solver.harmonic_balance.state import State, first_response
 from solver.loading_history.path import LoadingPath
 from solver.newton.run import Bordered, Budget, Run
 from solver.outcome import Outcome
@@ -23,43 +23,18 @@ from tests.references import coulomb_orbit
 from tests.solver.models import case_of, first_point, scene
 from tests.solver.reconstruction import full_motion
 
-# --- natural steps ---
-
-TOLERANCE = 1e-9
 WALL_OMEGA = 1.2  # rad/s; without the wall the mass reaches it at 0.1 |1 - 1.2^2 + 0.06i| = 0.0444 N
 GRAZING = 0.1 * abs(1 - WALL_OMEGA**2 + 0.05j * WALL_OMEGA)
 
 
-def wall(omega):
-    """Vibro-impact along the excitation amplitude: joints, a state found from nothing, and the motion of the mass."""
-    case = case_of(scene("vibro_impact"), 0.0, WALL_OMEGA, SolverSettings(5, 64))
-
-    def joint_at(amplitude):
-        return case.joint(omega, amplitude)
-
-    def first(amplitude):
-        return replace(first_point(case, omega, amplitude), parameter=amplitude)
-
-    def size(point):
-        structure = case.joint(omega, point.parameter).structure
-        response = structure.response_h(point.evaluation.displacement_h[0, :1])
-        return float(np.hypot(response[0, 1], response[0, 2]))
-
-    return joint_at, first, size
-
-
 def test_natural_steps_end_before_a_fold_and_say_so():
-    joint_at, first, size = wall(WALL_OMEGA)
-
-    def balance_from(amplitude, state):
-        return balance_after(joint_at(amplitude), state)
-
-    point, arrived = follow_naturally(balance_from, first(0.03), 0.06, Run(TOLERANCE))
+    path = LoadingPath(case_of(scene("vibro_impact"), 0.0, WALL_OMEGA, SolverSettings(5, 64)), 1.0, WALL_OMEGA)
+    start = replace(first_point(path.case, WALL_OMEGA, 0.03), parameter=0.03)
+    point, arrived = follow_naturally(path.balance_from, start, 0.06, Run(1e-9))
     assert not arrived
     # the branch without impacts ends where the mass reaches the wall; 1/64 of the range is the shortest step
     assert point.parameter == pytest.approx(GRAZING, abs=2 * 0.03 / 64)
-    assert point.evaluation.scaled_residual() <= TOLERANCE
-    assert size(point) == pytest.approx(0.1, rel=0.02, abs=0.0)
+    assert abs(first_response(path.joint_at(point.parameter), point.evaluation)[0]) == pytest.approx(0.1, rel=0.02)
 
 
 @pytest.mark.parametrize("over", ["frequency", "load"])
@@ -98,25 +73,23 @@ def test_two_masses_relax_from_rest_to_their_exact_motion(omega):
 
 @pytest.mark.parametrize("change", [1e-4, -1e-4])
 def test_a_motion_leaves_an_unstable_state_whose_growth_long_steps_would_damp(change):
-    joint_at, first, size = wall(WALL_OMEGA)
+    path = LoadingPath(case_of(scene("vibro_impact"), 0.0, WALL_OMEGA, SolverSettings(5, 64)), 1.0, WALL_OMEGA)
 
     def grows(point):
-        return not Run(1e-8).is_stable(joint_at(point.parameter), point.evaluation)
+        return not Run(1e-8).is_stable(path.joint_at(point.parameter), point.evaluation)
 
     # through the fold at grazing, back to the excitation of the start: the branch between the two stable ones
-    start = first(0.03)
-    case = case_of(scene("vibro_impact"), 0.0, WALL_OMEGA, SolverSettings(5, 64))
-    path = LoadingPath(case, 1.0, WALL_OMEGA)
-    arc = Arc(lambda amplitude: Balance(joint_at(amplitude), start.next_history), path.slope, start, 0.03, Run(1e-9))
+    start = replace(first_point(path.case, WALL_OMEGA, 0.03), parameter=0.03)
+    arc = Arc(lambda load: Balance(path.joint_at(load), start.next_history), path.slope, start, 0.03, Run(1e-9))
     passed = ((a, b) for a, b, _ in arc.steps(1.0) if (a.parameter - 0.03) * (b.parameter - 0.03) < 0.0)
     middle = next(filter(grows, (arc.state_at(a, b, 0.03) for a, b in passed)))
-    before, joint = case.joint(WALL_OMEGA, 0.03), case.joint(WALL_OMEGA, 0.03 * (1.0 + change))
-    found = relax_to_periodic(joint, np.zeros(1), middle, before, Run(case.settings.tolerance))
+    before, joint = (path.joint_at(0.03 * (1.0 + part)) for part in (0.0, change))
+    found = relax_to_periodic(joint, np.zeros(1), middle, before, Run(1e-8))
     assert isinstance(found, State)
-    settled = replace(found, parameter=0.03 * (1.0 + change))
-    assert not grows(settled)
+    assert not grows(replace(found, parameter=joint.excitation_amplitude))
     # the two sides of the unstable state end at different stable states
-    assert (size(settled) > size(middle)) == (change < 0.0)
+    settled, unstable = (abs(first_response(joint, each.evaluation)[0]) for each in (found, middle))
+    assert (settled > unstable) == (change < 0.0)
 
 
 @pytest.mark.slow
