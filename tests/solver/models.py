@@ -16,6 +16,7 @@ from solver.loading_history.start_states import FrequencySweep
 from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel, needed_nodal_diameters, with_friction
 from solver.newton.run import Run
 from solver.results.history import StartState, WearHistory
+from solver.results.state_report import evaluated
 from solver.settings import Resolution, SolverSettings, first_resolution
 from solver.structure.joint import Case, Joint, build_case
 from solver.wear.history import integrate_together
@@ -158,6 +159,14 @@ def branch_states(model, friction, amplitude, omegas, settings, sweep="up") -> l
     return [found[index] for index in range(len(omegas))]
 
 
+def state_at(model, friction, amplitude, omega, settings, sweep="up") -> tuple[StartState, Case, State]:
+    """A start state, which must exist, at an angular frequency, rad/s; its case, and the state evaluated."""
+    (start,) = branch_states(model, friction, amplitude, [omega], settings, sweep)
+    assert start.state is not None
+    case = case_of(model, friction, start.penalty_omega, settings, start.resolution)
+    return start, case, evaluated(case, start.state)
+
+
 def worn_state(kinds: Sequence[str], settings: SolverSettings) -> tuple[Joint, State]:
     """A random joint, worn a little, whose pairs stick, slip and open, and its state."""
     worn = np.random.default_rng(1).uniform(0.0, 2e-6, len(kinds))
@@ -184,8 +193,8 @@ def glued_frequency(model: ReducedModel) -> float:
     """First natural frequency of a model with its joint held, Hz, at the nodal diameter of the excitation."""
     linear = model.linear[model.nodal_diameter]
     inner = np.setdiff1d(np.arange(len(linear.mass)), model.contact.dofs.ravel())
-    values = eigh(linear.stiffness[np.ix_(inner, inner)], linear.mass[np.ix_(inner, inner)], eigvals_only=True)
-    return float(np.sqrt(values[0]) / (2.0 * np.pi))
+    stiffness, mass = (part[np.ix_(inner, inner)] for part in (linear.stiffness, linear.mass))
+    return float(np.sqrt(eigh(stiffness, mass, eigvals_only=True)[0]) / (2.0 * np.pi))
 
 
 def assert_same(one: Any, other: Any) -> None:

@@ -17,11 +17,10 @@ from solver.harmonic_balance.state import State, first_response
 from solver.loading_history.path import LoadingPath
 from solver.newton.run import Bordered, Budget, Run
 from solver.outcome import Outcome
-from solver.results.state_report import periodic_state
+from solver.results.state_report import periodic_motion
 from solver.settings import SolverSettings
 from tests.references import coulomb_orbit
 from tests.solver.models import case_of, first_point, scene
-from tests.solver.reconstruction import full_motion
 
 WALL_OMEGA = 1.2  # rad/s; without the wall the mass reaches it at 0.1 |1 - 1.2^2 + 0.06i| = 0.0444 N
 GRAZING = 0.1 * abs(1 - WALL_OMEGA**2 + 0.05j * WALL_OMEGA)
@@ -67,7 +66,7 @@ def test_two_masses_relax_from_rest_to_their_exact_motion(omega):
     rest = first_point(case, omega, 0.0)
     quiet, joint = case.joint(omega, 0.0), case.joint(omega, 20.0)
     found = relax_to_periodic(joint, idle, rest, quiet, Run(1e-8))
-    moved = np.abs(full_motion(case.model, periodic_state(found))[1])
+    moved = np.abs(periodic_motion(joint, found.evaluation).displacement[:, 1])
     assert moved == pytest.approx([abs(orbit.harmonic(dof)) for dof in (0, 1)], rel=0.02, abs=0.0)
 
 

@@ -182,7 +182,6 @@ def test_what_has_no_mode_says_so():
     found = backbone(slider(), SIZE * np.sqrt(MASS) * np.array([0.5, 2.0]), 0.5, sweep="down")
     assert found.outcome == (Outcome.BRANCH_LOST, Outcome.CONVERGED)
     assert np.isnan(found.frequency).tolist() == [True, False]
-    assert "the mode is followed down to the amplitude" in found.message[0]
 
 
 @pytest.mark.slow

@@ -140,7 +140,6 @@ def test_a_reference_solution_that_fails_leaves_the_error_unknown(monkeypatch):
     assert np.isinf(history.worn_volume_error[~known]).all()
     assert np.isinf(history.wear_depth_error[-1][history.wear_depth[-1] > 0.0]).all()
     assert history.outcome is Outcome.INACCURATE
-    assert "not known: with longer steps" in history.message
 
 
 @pytest.mark.parametrize("scheme", ["implicit", "adaptive"])
@@ -150,7 +149,6 @@ def test_a_history_whose_state_has_no_other_to_compare_with_says_so(scheme, lost
     found = replace(start()[1], response_error=np.inf, wear_rate_error=np.inf, message="lost", **lost)
     history = march_wear(start()[0], 0.5, found, WEAR, 4000.0, scheme, CYCLES[::4], GIVEN)
     assert history.outcome is Outcome.INACCURATE
-    assert "not known" in history.message
     assert history.worn_volume_error.tolist() == [0.0, np.inf, np.inf]
     assert np.isinf([*history.response_error, *history.wear_rate_error]).all()
     np.testing.assert_array_equal(history.wear_depth_error, np.where(history.wear_depth > 0.0, np.inf, 0.0))

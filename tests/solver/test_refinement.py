@@ -13,9 +13,8 @@ from solver.accuracy.resolved_state import Estimate, ResolvedState
 from solver.contact.coulomb import SLIP, STICK
 from solver.harmonic_balance.dlft import Balance
 from solver.newton.run import Run
-from solver.results.state_report import evaluated
 from solver.settings import Resolution, SolverSettings, all_orders
-from tests.solver.models import ALL_KINDS, OMEGA, branch_states, case_of, first_point, random_model, scene, worn_state
+from tests.solver.models import ALL_KINDS, OMEGA, case_of, first_point, random_model, scene, state_at, worn_state
 
 # --- certificates ---
 
@@ -26,10 +25,9 @@ SLIDER = ("sdof_slider", 0.5, 10.0, 2 * np.pi * 160.0)
 @lru_cache
 def on_branch(name, friction, amplitude, omega, n_harmonics):
     """The state of a sweep up, evaluated from what is stored of it: joint and evaluation."""
-    model, settings = scene(name, n_harmonics), SolverSettings(n_harmonics, 256)
-    (start,) = branch_states(model, friction, amplitude, [omega], settings)
-    case = case_of(model, friction, start.penalty_omega, settings)
-    return case.joint(omega, amplitude), evaluated(case, start.state).evaluation
+    settings = SolverSettings(n_harmonics, 256)
+    _, case, state = state_at(scene(name, n_harmonics), friction, amplitude, omega, settings)
+    return state.joint(case), state.evaluation
 
 
 @lru_cache

@@ -10,12 +10,12 @@ import pytest
 from solver.accuracy.certificate import certify
 from solver.outcome import Outcome
 from solver.results.history import first_cut_off, judge
-from solver.results.state_report import LOOP_PHASES, periodic_state, report_state
+from solver.results.state_report import LOOP_PHASES, periodic_motion, periodic_state, report_state
 from solver.settings import FINE_SAMPLES, SolverSettings, all_orders
 from solver.structure.fourier import build_basis
 from studies import build_scene
 from tests.solver.models import ALL_KINDS, branch_states, march_wear, scene, worn_state
-from tests.solver.reconstruction import full_motion, harmonic_structure, pair_period, series
+from tests.solver.reconstruction import harmonic_structure, pair_period, series
 from tests.studyrunner.faked_runs import history
 
 # --- states ---
@@ -60,8 +60,8 @@ def test_the_contact_force_is_that_of_the_plain_law(kinds):
 def test_the_report_is_that_of_the_time_signals(kinds):
     joint, point, state = periodic(kinds)
     model, at = joint.model, point.evaluation
-    report = report_state(joint, at, certify(joint, at))
-    responses = [harmonic_structure(model, n).response @ moved for n, moved in enumerate(full_motion(model, state))]
+    report, whole = report_state(joint, at, certify(joint, at)), periodic_motion(joint, at).displacement
+    responses = [harmonic_structure(model, n).response @ moved for n, moved in enumerate(whole.T)]
     assert report["response"] == pytest.approx(responses[1], rel=1e-8, abs=0.0)
     static = np.real(responses[0])
     phase = 2 * np.pi * np.arange(FINE_SAMPLES) / FINE_SAMPLES

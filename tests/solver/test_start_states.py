@@ -20,13 +20,22 @@ from solver.loading_history.start_states import FIRST_ITERATIONS
 from solver.newton.run import Run, guarded
 from solver.outcome import Outcome
 from solver.packing import Packed
-from solver.results.state_report import evaluated
 from solver.settings import Resolution, SolverSettings, all_orders
 from solver.structure.condensation import condense
 from tests.benchmarks.frame import measure
 from tests.random_decks import random_deck, run_deck, static_forces
 from tests.random_scenes import random_scene
-from tests.solver.models import OMEGA, branch_states, case_of, dovetail, first_point, random_model, scene, sweep_of
+from tests.solver.models import (
+    OMEGA,
+    branch_states,
+    case_of,
+    dovetail,
+    first_point,
+    random_model,
+    scene,
+    state_at,
+    sweep_of,
+)
 
 AUTOMATIC = SolverSettings()
 
@@ -251,12 +260,10 @@ def test_a_mass_that_slides_all_the_time_needs_no_reference_sweep():
 @pytest.mark.slow
 @pytest.mark.parametrize(("seed", "slips"), [(160, False), (178, True), (371, False), (710, False)])
 def test_states_whose_slip_was_ratcheting_are_found_and_slip_by_their_vibration_alone(seed, slips):
-    scene, settings = random_scene(seed), SolverSettings()
-    omega = 2.0 * np.pi * scene.frequency_hz
-    (start,) = branch_states(scene.model, scene.friction, scene.amplitude, [omega], settings)
+    scene = random_scene(seed)
+    asked = scene.model, scene.friction, scene.amplitude, 2.0 * np.pi * scene.frequency_hz
+    start, case, state = state_at(*asked, AUTOMATIC)
     assert start.outcome is Outcome.CONVERGED
-    case = case_of(scene.model, scene.friction, start.penalty_omega, settings, start.resolution)
-    state = evaluated(case, start.state)
     at = state.evaluation
     assert not ratchets(state.joint(case), at, 1e-3)
     # shaken down with 3 harmonics scene 710 slips 1e-12 N m on to where 9 have it, a thousand times what is left there
@@ -270,9 +277,8 @@ def test_the_error_is_told_where_slip_begins_behind_the_last_node(frequency):
     model, omega = scene("dovetail_sector", 39, mesh=1), 2.0 * np.pi * frequency
 
     def slip_work(settings):
-        (start,) = branch_states(model, 0.5, 0.5, [omega], settings)
-        case = case_of(model, 0.5, start.penalty_omega, settings, start.resolution)
-        return evaluated(case, start.state).evaluation.slip_work.sum(), start.wear_rate_error
+        start, _, state = state_at(model, 0.5, 0.5, omega, settings)
+        return state.evaluation.slip_work.sum(), start.wear_rate_error
 
     work, told = slip_work(SolverSettings())
     true = slip_work(SolverSettings(39, 512, rtol=1e-3))[0] / work - 1.0

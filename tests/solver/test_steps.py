@@ -19,7 +19,7 @@ from solver.wear import problem as control
 from solver.wear.check import choose_harmonics
 from solver.wear.step import moved_fraction, rate_slope
 from solver.wear.wearing_joint import Given, WearingJoint, WearRequest, WearState
-from tests.solver.models import branch_states, case_of, dovetail, march_wear, scene
+from tests.solver.models import branch_states, case_of, dovetail, march_wear, scene, state_at
 from tests.solver.worn_slider import AREA, problem
 
 
@@ -176,7 +176,6 @@ def test_a_wear_coefficient_in_the_wrong_unit_is_a_step_too_long_and_the_step_th
     for scheme in ("explicit", "implicit"):
         refused = worn(scheme, 1000.0, 5000.0)
         assert refused.outcome is Outcome.STEP_TOO_LONG
-        assert "from cycle 0 on" in refused.message
     advised = float(refused.message.split("at most ")[1].split()[0])
     assert 1e-4 < advised < 1e-2
     assert worn("explicit", advised, 20.0 * advised).outcome is Outcome.CONVERGED
@@ -184,8 +183,7 @@ def test_a_wear_coefficient_in_the_wrong_unit_is_a_step_too_long_and_the_step_th
 
 def test_the_derivatives_of_the_wear_are_those_of_the_solved_states():
     model = scene("cylinder_on_flat", 3, strips=24)
-    (start,) = branch_states(model, 0.6, 1.0, [2.0 * np.pi * 20.0], COARSE_BLADE, "ramp")
-    case = case_of(model, 0.6, start.penalty_omega, COARSE_BLADE, start.resolution)
+    start, case, _ = state_at(model, 0.6, 1.0, 2.0 * np.pi * 20.0, COARSE_BLADE, "ramp")
     work = WearingJoint(case, start, WearRequest(1e-4, Given(1.0), np.array([0.0, 1.0])))
     state = work.unworn_state()
     work.run = Run(1e-13)

@@ -13,7 +13,7 @@ from solver.wear import slow_time
 from solver.wear.problem import WearProblem
 from solver.wear.slow_time import CERTIFIED, Course, Integrator, Node
 from solver.wear.wearing_joint import WearRequest
-from tests.solver.models import branch_states, case_of, march_wear, random_model, scene
+from tests.solver.models import branch_states, march_wear, random_model, scene, state_at
 from tests.solver.worn_slider import (
     AREA,
     COARSE,
@@ -116,8 +116,7 @@ def test_a_response_at_a_depth_is_that_of_less_normal_force():
 def steps_and_depth(rtol):
     """Number of steps, and depth at the end, m, of an adaptive history without its reference solution."""
     model, settings = scene("sdof_slider", 13), SolverSettings(13, 128, rtol=rtol)
-    (start,) = branch_states(model, FRICTION, 10.0, [OMEGA], settings)
-    case = case_of(model, FRICTION, start.penalty_omega, settings, start.resolution)
+    start, case, _ = state_at(model, FRICTION, 10.0, OMEGA, settings)
     asked = WearRequest(WEAR, None, np.array([0.0, END]))
     course = Integrator(np.inf).integrate(WearProblem(case, start, asked)).course
     return len(course.ends), float(course.read(np.array([END]))["wear_depth"][0, 0])

@@ -152,7 +152,6 @@ def test_curves_and_balances_without_a_state_say_why():
     doubled = balance_of(model, 0.146, 0.02, 0.0, settings=SETTINGS)
     assert doubled.outcome is Outcome.PERIOD_DOUBLED
     assert np.isnan(doubled.state).all()
-    assert doubled.message
     assert np.isfinite(doubled.residual(np.zeros(doubled.size))).all()
 
 
