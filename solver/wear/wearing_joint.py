@@ -201,10 +201,9 @@ class WearingJoint:
         known = periodic or start.state
         assert known is not None
         point = evaluated(self.case, known)
-        estimate = Estimate(start.response_error, start.wear_rate_error)
         # the stability of a start state has been checked
         judged_h, accurate = point.evaluation.predicted_h, start.outcome is Outcome.CONVERGED
-        checked = Checked(left_out(point), start.by_resolution or estimate, accurate, judged_h)
+        checked = Checked(left_out(point), start.by_resolution, accurate, judged_h)
         return self.with_rates(WearState(0.0, point, nothing, checked, Record(nothing), Guide((), 0.0)))
 
     @cached_property
@@ -214,8 +213,7 @@ class WearingJoint:
         """
         start, reference = self.start, self.start.reference
         if reference is None:
-            lost = start.by_resolution is not None and math.isinf(start.wear_rate_error)
-            return UNKNOWN if lost else NOTHING
+            return UNKNOWN if math.isinf(start.wear_rate_error) else NOTHING
         own, other = self.unworn_state(), self.unworn_state(reference)
         apart, whole = own.rate * self.area - other.rate * self.area, self.volume_rate(own)
         rate = float(in_whole(apart)) / whole if whole > 0.0 else 0.0

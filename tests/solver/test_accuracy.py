@@ -90,8 +90,6 @@ def test_events_shorter_than_a_sample_or_a_harmonic_are_seen(name):
     check(HARD[name], 1e-2, "up")
 
 
-# --- rigid friction at the tip of a cantilever, and the peak of a response ---
-
 CANTILEVERS = [  # spring, force, N, frequency, rad/s, rtol; `python -m tests.benchmarks.accuracy` has more
     ("rigid", 3.0, 0.7, 1e-2),
     ("soft spring", 3.0, 1.0, 1e-3),

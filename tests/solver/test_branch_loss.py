@@ -144,9 +144,6 @@ def test_a_root_that_begins_to_slide_all_over_wears_on():
     assert abs(1e9 * history.worn_volume[-1] - 8.701) < 1e-2 * 8.701
 
 
-# --- interrupted histories ---
-
-
 @pytest.mark.slow
 def test_a_history_goes_on_before_and_behind_a_jump(monkeypatch):
     """To the same bits, from some of the places where it was saved."""

@@ -124,8 +124,11 @@ def worn(cycles, scheme="adaptive", **more):
 
 
 @pytest.mark.parametrize("scheme", ["adaptive", "implicit"])
-def test_partial_slip_ends_in_the_limit_state_of_the_strips(scheme):
-    found = worn(ToTheEnd(9), scheme)
+def test_partial_slip_ends_in_the_limit_state_of_the_strips_also_where_it_was_interrupted(scheme, monkeypatch):
+    monkeypatch.setattr("solver.wear.problem.WearProblem.iterations_per_save", 30)
+    kept = list[Packed]()
+    found = worn(ToTheEnd(9), scheme, keep=kept.append)
+    assert_same(worn(ToTheEnd(9), scheme, resume=kept[-1]), found)
     # the harmonics are given
     assert found.outcome is (Outcome.CONVERGED if scheme == "implicit" else Outcome.INACCURATE)
     # which pairs slip decides the final depths; those between which pressure moves are at least 2e-4 exact
@@ -139,14 +142,6 @@ def test_partial_slip_ends_in_the_limit_state_of_the_strips(scheme):
     assert np.diff(way) == pytest.approx(np.full(8, 0.25), rel=1e-6)
     assert found.cycles[0] == 0.0
     assert (np.diff(found.cycles) > 0.0).all()
-
-
-def test_one_that_was_interrupted_is_the_same_to_the_last_bit(monkeypatch):
-    monkeypatch.setattr("solver.wear.problem.WearProblem.iterations_per_save", 30)
-    kept: list[Packed] = []
-    whole = worn(ToTheEnd(9), keep=kept.append)
-    assert kept
-    assert_same(worn(ToTheEnd(9), resume=kept[-1]), whole)
 
 
 def test_a_constant_load_wears_without_end_at_the_rate_of_its_path():

@@ -237,9 +237,6 @@ def test_no_end_can_be_without_a_sentence(outcome):
         Failure(outcome, "")
 
 
-# --- random scenes ---
-
-
 @pytest.mark.slow
 def test_some_scenes_are_solved():
     """Of scene 16 few harmonics do not show an impact. The benchmark runs 1000 scenes, of which some take minutes."""

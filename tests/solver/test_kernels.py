@@ -148,9 +148,6 @@ def test_a_mass_moves_as_in_a_plain_twin_with_tiny_steps(seed, both):
     assert slip_work == pytest.approx((normal * speed).sum() * step, rel=3e-3)
 
 
-# --- compiling ---
-
-
 def test_no_kernel_assigns_a_slice_to_a_slice():
     """For such an assignment numba compiles the text of an error message, 3 s in each process."""
     kernels = [

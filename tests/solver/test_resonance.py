@@ -17,8 +17,6 @@ from tests.solver.models import assert_same, dovetail, random_balance, random_mo
 from tests.solver.models import march_wear as march_from
 from tests.solver.reconstruction import harmonic_structure
 
-# --- the resonance of a state ---
-
 WEAR = 1.1e-11  # 1/Pa
 
 
@@ -103,31 +101,24 @@ def test_where_the_spring_no_longer_presses_the_resonance_is_the_natural_frequen
 
 @pytest.mark.slow
 @pytest.mark.parametrize("word", ["resonance", "peak"])
-def test_an_interrupted_history_is_equal_to_the_last_bit(word, monkeypatch):
+def test_an_interrupted_search_and_history_are_equal_to_the_last_bit(word, monkeypatch):
     monkeypatch.setattr("solver.wear.problem.WearProblem.iterations_per_save", 8)
     model, follow, settings = scene("sdof_slider", damping=DAMPING), FollowedFrequency(word, *BETWEEN), SolverSettings()
-    ((_, start),) = sweep_of(model, 0.5, 10.0, "up", settings).states(follow)
-    kept: list[Packed] = []
+    given, kept = list[Packed | str](), list[Packed]()
+    ((_, start),) = sweep_of(model, 0.5, 10.0, "up", settings, given.append).states(follow)
+    saved = [progress for progress in given if not isinstance(progress, str)]
+    assert len(saved) > 2
+    for progress in (saved[0], saved[len(saved) // 2], saved[-1]):
+        sweeps = sweep_of(model, 0.5, 10.0, "up", settings)
+        sweeps.load(progress)
+        ((_, again),) = sweeps.states(follow)
+        assert again.state.omega == start.state.omega
+        np.testing.assert_array_equal(again.state.displacement_h, start.state.displacement_h)
     asked = model, 0.5, start, WEAR, 1e3, "implicit", CYCLES, settings
     whole = march_from(*asked, keep=kept.append, follow=follow)
     assert len(kept) > 1
     for progress in (kept[0], kept[-1]):
         assert_same(march_from(*asked, resume=progress, follow=follow), whole)
-
-
-@pytest.mark.slow
-def test_an_interrupted_search_finds_the_same_start_to_the_last_bit():
-    model, follow = scene("sdof_slider", damping=DAMPING), FollowedFrequency("resonance", *BETWEEN)
-    given: list[Packed | str] = []
-    ((_, whole),) = sweep_of(model, 0.5, 10.0, "up", SolverSettings(), given.append).states(follow)
-    kept = [progress for progress in given if not isinstance(progress, str)]
-    assert len(kept) > 2
-    for progress in (kept[0], kept[len(kept) // 2], kept[-1]):
-        sweeps = sweep_of(model, 0.5, 10.0, "up", SolverSettings())
-        sweeps.load(progress)
-        ((_, again),) = sweeps.states(follow)
-        assert again.state.omega == whole.state.omega
-        np.testing.assert_array_equal(again.state.displacement_h, whole.state.displacement_h)
 
 
 @pytest.mark.slow

@@ -18,8 +18,6 @@ from tests.solver.models import ALL_KINDS, branch_states, march_wear, scene, wor
 from tests.solver.reconstruction import harmonic_structure, pair_period, series
 from tests.studyrunner.faked_runs import history
 
-# --- states ---
-
 FRICTION = 0.4
 SETTINGS = SolverSettings(harmonics=3, samples=64, tolerance=1e-10)
 KINDS = {"3d": ("3d",) * 3, "mixed": ALL_KINDS}
@@ -79,8 +77,6 @@ def test_the_report_is_that_of_the_time_signals(kinds):
         assert at.slip_work[pair] == pytest.approx(steps @ pressure, rel=1e-12, abs=1e-20)
 
 
-# --- fretting loops ---
-
 WEAR = 1.1e-11  # 1/Pa
 CYCLES = np.array([0.0, 2000.0, 8000.0, 14000.0, 16000.0])
 
@@ -112,8 +108,6 @@ def test_the_loop_of_a_sliding_mass_is_a_rectangle_of_the_energy_that_friction_t
     work = np.sum(mean * (np.roll(motion[..., 1], -1, axis=1) - motion[..., 1]), axis=1)[[0, 2, 4]]
     assert work == pytest.approx(0.5 * history.wear_rate[[0, 2, 4]] / WEAR, rel=3e-3, abs=0.0)
 
-
-# --- outcomes ---
 
 ALL = np.arange(3)
 UNKNOWN = {"worn_volume": 1e-9 * np.arange(3.0), "worn_volume_error": np.array([0.0, 0.1, 0.6])}
@@ -150,9 +144,6 @@ def test_the_outcome_is_that_of_the_counts_that_are_judged(rows, changed, outcom
     assert found[0] is outcome
     assert said in found[1]
     assert bool(found[1]) is bool(said)
-
-
-# --- contacts that reach an edge where the bodies go on ---
 
 
 def test_load_or_wear_at_the_edge_is_found_at_its_first_count():

@@ -254,9 +254,6 @@ def test_a_mass_that_slides_all_the_time_needs_no_reference_sweep():
     assert 0.0 < start.response_error < 1e-2
 
 
-# --- ratcheting of marched masses ends in shakedown ---
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(("seed", "slips"), [(160, False), (178, True), (371, False), (710, False)])
 def test_states_whose_slip_was_ratcheting_are_found_and_slip_by_their_vibration_alone(seed, slips):

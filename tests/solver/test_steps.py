@@ -145,8 +145,6 @@ def test_a_state_with_other_harmonics_has_the_wear_rate_of_its_own_motion():
     assert abs(chosen.rate / state.rate - 1.0).max() > 1e-4
 
 
-# --- limits ---
-
 COARSE_BLADE = SolverSettings(harmonics=3, samples=64)
 STIFFNESS, SLIDE, WEAR = 1e6, 1e-4, 1e-10  # N/m, of each pair towards the block; m, amplitude of the sliding; 1/Pa
 LIMIT = 2.0 / (WEAR / 1e-4 * 4.0 * SLIDE * STIFFNESS)

@@ -27,8 +27,6 @@ from tests.solver.worn_slider import (
     march,
 )
 
-# --- the slider ---
-
 STEPS = (8000.0, 4000.0, 2000.0, 1000.0)
 GIVEN: tuple[Scheme, ...] = ("explicit", "implicit")
 SCHEMES: tuple[Scheme, ...] = (*GIVEN, "adaptive")

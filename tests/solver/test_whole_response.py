@@ -162,9 +162,6 @@ def test_unknowns_that_cannot_be_are_refused():
             balance.residual(wrong)
 
 
-# --- travelling waves ---
-
-
 @pytest.mark.slow
 @pytest.mark.parametrize(("diameter", "frequency", "amplitude"), [(3, 320.0, 12.0), (5, 280.0, 3.3)])
 def test_a_wave_of_the_sector_is_that_of_the_ring_in_time(diameter, frequency, amplitude):
