@@ -62,8 +62,9 @@ def solve_first_state(case: Case, omega: float, excitation_amplitude: float, run
     slid = None if sliding is None else run.state(whole, sliding, 1.0, NEAR_ITERATIONS)
     if slid is not None and run.is_stable(whole.joint, slid.evaluation):
         return slid
+    friction = rest.evaluation.force_h[:, 1:, 0]
     for fraction in (0.0, RELIEF):
-        relieved = Balance(quiet, relieved_history(quiet, rest, fraction))
+        relieved = Balance(quiet, quiet.law.relieved(rest.next_history, fraction * friction))
         begun = run.state(relieved, rest.evaluation.predicted_h, 0.0) if fraction else rest
         if begun is None:
             continue
@@ -106,11 +107,6 @@ def sliding_start(balance: Balance, rest: State) -> FloatArray | None:
     for values, amplitude in ((motion_h, moved), (force_h, friction)):
         values[:, :, 1], values[:, :, 2] = amplitude.real, -amplitude.imag
     return balance.predict(motion_h, force_h)
-
-
-def relieved_history(joint: Joint, rest: State, fraction: float) -> FloatArray:
-    """Tangential history (n_contact, 2), m, that reduces the friction forces of a state at rest by a fraction."""
-    return joint.law.relieved(rest.next_history, fraction * rest.evaluation.force_h[:, 1:, 0])
 
 
 def solve_static_state(joint: Joint, run: Run) -> State | Failure:

@@ -98,7 +98,7 @@ def solve_at_peak(
 
     Arguments as in `solve_at_lag`. Along the frequency the wear depth is constant, also in an implicit step.
     """
-    below, above, accuracy = 0.0, math.pi, accepted_rise(case.settings.rtol)
+    below, above, accuracy = 0.0, math.pi, PEAK_RISE * case.settings.rtol
     last, rise_before = lag, 0.0
     for _ in range(ATTEMPTS):
         found = solve_at_lag(case, balance, start, lag, run, most)
@@ -119,11 +119,6 @@ def solve_at_peak(
         lag = lag + step if below < lag + step < above else 0.5 * (below + above)
         balance, start = found.balance, found.at.predicted_h
     return None
-
-
-def accepted_rise(rtol: float) -> float:
-    """Rise of the logarithm of an amplitude with the phase lag, 1/rad, at which the amplitude counts as the largest."""
-    return PEAK_RISE * rtol
 
 
 def rise_of_response(state: Bordered, run: Run, accuracy: float) -> tuple[float, float]:

@@ -17,7 +17,7 @@ import numpy as np
 from solver.accuracy.refinement import refine
 from solver.accuracy.resolved_state import NOTHING, Estimate, ResolvedState, shifted
 from solver.contact.coulomb import SEPARATED, STICK, friction_limit
-from solver.continuation.first_state import RELIEF, relieved_history, state_at_rest
+from solver.continuation.first_state import RELIEF, state_at_rest
 from solver.continuation.natural import FINE_STEP, LARGEST_STEP_RATIO, NEAR_ITERATIONS
 from solver.harmonic_balance.dlft import Balance, Linearisation
 from solver.harmonic_balance.state import Failure, State, state_of
@@ -255,7 +255,8 @@ class Rest:
         start = self.state.evaluation.predicted_h.copy()
         start[:, 1:] = joint.structure.force_h[:, 1:]
         values = np.array([linear.omega, linear.damping_ratio, amplitude])
-        histories = (relieved_history(joint, self.state, fraction) for fraction in (0.0, RELIEF))
+        rest, friction = self.state.next_history, self.state.evaluation.force_h[:, 1:, 0]
+        histories = (joint.law.relieved(rest, fraction * friction) for fraction in (0.0, RELIEF))
         found = (self.mode.find(amplitude, (start, values), history, run.fresh()) for history in histories)
         return next((node for node in found if node is not None), None)
 

@@ -19,7 +19,7 @@ import numpy as np
 from solver.accuracy.resolved_state import NOTHING, UNKNOWN, Estimate, left_out
 from solver.contact.wear_law import ARCHARD, WearLaw, wearing_work
 from solver.continuation.natural import NEAR_ITERATIONS
-from solver.continuation.phase_lag import accepted_rise, rise_of_response, solve_at_lag, solve_at_peak
+from solver.continuation.phase_lag import PEAK_RISE, rise_of_response, solve_at_lag, solve_at_peak
 from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
 from solver.harmonic_balance.state import Failure, State, state_of, vibration_change
 from solver.model import FloatArray
@@ -255,7 +255,7 @@ class WearingJoint:
             return None
         turn = math.nan if solved.reduced is None else abs(float(solved.reduced[0, 0]))
         if math.isnan(turn) and state.half_width == 0.0:
-            turn = abs(rise_of_response(solved, self.run, accepted_rise(case.settings.rtol))[1])
+            turn = abs(rise_of_response(solved, self.run, PEAK_RISE * case.settings.rtol)[1])
         half_width = state.half_width if math.isnan(turn) else 1.0 / max(turn, 1e-300)
         point = state_of(solved.balance.joint, solved.at)
         return self.with_rates(replace(state, point=point, lag=lag, half_width=half_width))
@@ -284,5 +284,5 @@ class WearingJoint:
             return 0.0
         lag = state.checked.estimate.response
         if self.request.follow.of == "peak":
-            lag = math.sqrt(2.0 * lag) + accepted_rise(self.case.settings.rtol)
+            lag = math.sqrt(2.0 * lag) + PEAK_RISE * self.case.settings.rtol
         return state.half_width * lag / (2.0 * math.pi)
