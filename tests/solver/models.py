@@ -35,12 +35,8 @@ def random_contact(random: np.random.Generator, kinds: Sequence[str], n_inner: i
     """Pairs whose displacements lie scattered among the inner ones."""
     n_contact = len(kinds)
     dofs = np.full((n_contact, 3), -1)
-    places = random.permutation(sum(len(COMPONENTS[kind]) for kind in kinds) + n_inner)
-    taken = 0
-    for pair, kind in enumerate(kinds):
-        for component in COMPONENTS[kind]:
-            dofs[pair, component] = places[taken]
-            taken += 1
+    places = [(pair, component) for pair, kind in enumerate(kinds) for component in COMPONENTS[kind]]
+    dofs[tuple(np.transpose(places))] = random.permutation(len(places) + n_inner)[: len(places)]
     return ContactInterface(
         dofs=dofs.astype(np.int64),
         area=random.uniform(0.5e-4, 2e-4, n_contact),
@@ -191,7 +187,7 @@ def march_wear(
 
 def glued_frequency(model: ReducedModel) -> float:
     """First natural frequency of a model with its joint held, Hz, at the nodal diameter of the excitation."""
-    linear = model.linear[model.nodal_diameter]
+    linear = model.harmonic_structure(1)
     inner = np.setdiff1d(np.arange(len(linear.mass)), model.contact.dofs.ravel())
     stiffness, mass = (part[np.ix_(inner, inner)] for part in (linear.stiffness, linear.mass))
     return float(np.sqrt(eigh(stiffness, mass, eigvals_only=True)[0]) / (2.0 * np.pi))

@@ -154,7 +154,8 @@ def slider_state(gain=0.0, damping=20.0, friction=0.5):
 
 
 @pytest.mark.parametrize("gain", [0.0, 2e-3], ids=["fixed depth", "growing depth"])
-def test_a_state_at_its_own_lag_has_its_own_frequency(gain):
+def test_a_state_at_its_own_lag_has_its_own_frequency_and_the_lag_changes_as_by_finite_differences(gain):
+    """With growing depths the latter holds only where the elimination of the depth sees the frequency."""
     case, state = slider_state(gain)
     assert (state.at.wear_depth > 0.0) == (gain > 0.0)
     lag = phase_lag(state.balance.joint, state.at)
@@ -163,18 +164,12 @@ def test_a_state_at_its_own_lag_has_its_own_frequency(gain):
     assert found.values[0] == pytest.approx(LAG_OMEGA, rel=1e-9)
     np.testing.assert_allclose(found.at.wear_depth, state.at.wear_depth, rtol=1e-8)
 
-
-@pytest.mark.parametrize("gain", [0.0, 2e-3], ids=["fixed depth", "growing depth"])
-def test_the_change_of_the_lag_with_the_frequency_is_that_of_finite_differences(gain):
-    """With growing depths this is exact only where the elimination of the depth sees the frequency."""
-    case, state = slider_state(gain)
     lags, length = [], 1e-5 * LAG_OMEGA
     for omega in (LAG_OMEGA - length, LAG_OMEGA + length):
         balance = replace(state.balance, joint=case.joint(omega, 10.0))
         end = Run(1e-12).state(balance, state.at.predicted_h)
         lags.append(phase_lag(balance.joint, end.evaluation))
     expected = (lags[1] - lags[0]) / (2.0 * length)
-    lag = phase_lag(state.balance.joint, state.at)
     # a single step of Newton's method, whose derivative is that of the start
     loose = replace(case, settings=replace(TIGHT, tolerance=1e-9))
     near = solve_at_lag(loose, state.balance, state.at.predicted_h, lag + 1e-6, Run(loose.settings.tolerance), most=1)

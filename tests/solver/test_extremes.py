@@ -59,15 +59,10 @@ def block(stiffness=(1e7, 2e7), *, ground=1e5, preload=100.0, lift=0.0):
     n = 3 + 3 * n_pairs
     k = np.zeros((n, n))
     k[:3, :3] = ground * np.eye(3)
-    for pair, size in enumerate(stiffness):
-        for component, spring in enumerate((size, 0.5 * size, 0.5 * size)):
-            tie = np.zeros(n)
-            tie[component], tie[3 + 3 * pair + component] = 1.0, -1.0
-            k += spring * np.outer(tie, tie)
-    mass, load_static, load_harmonic = np.zeros((n, n)), np.zeros(n), np.zeros(n, complex)
-    mass[:3, :3] = np.eye(3)
-    load_static[0] = preload
-    load_harmonic[:3] = lift, 1.0, 0.5j
+    ties = np.hstack([np.tile(np.eye(3), (n_pairs, 1)), -np.eye(3 * n_pairs)])
+    k += ties.T @ (np.outer(stiffness, [1.0, 0.5, 0.5]).reshape(-1, 1) * ties)
+    mass, load_static = np.diag([1.0] * 3 + [0.0] * (n - 3)), preload * np.eye(n)[0]
+    load_harmonic = np.pad([lift, 1.0, 0.5j], (0, n - 3))
     # 2 % of critical damping, of the block on its pairs
     c, dofs = 0.04 / np.sqrt(max(stiffness)) * k, 3 + np.arange(3 * n_pairs).reshape(n_pairs, 3)
     loads = {"load_static": load_static, "load_harmonic": load_harmonic, "response": [1, 2]}

@@ -15,18 +15,12 @@ from solver.outcome import Outcome, in_whole
 from solver.packing import Packed
 from solver.settings import SolverSettings
 from solver.wear import problem
-from solver.wear.errors import (
-    PAIR_OVER_VOLUME,
-    Compared,
-    HistoryError,
-    error_of_given_steps,
-    history_error,
-)
+from solver.wear.errors import PAIR_OVER_VOLUME, Compared, HistoryError, error_of_given_steps, history_error
 from solver.wear.history import integrate_together
 from solver.wear.problem import WearProblem
 from solver.wear.wearing_joint import Given, WearRequest
 from tests.solver.models import assert_same, branch_states, dovetail, march_wear, scene
-from tests.solver.worn_slider import exact_depths_of_motion
+from tests.solver.worn_slider import depths_of_motion
 
 WEAR = 1.1e-11  # 1/Pa
 GIVEN = SolverSettings(harmonics=5, samples=64)
@@ -81,7 +75,7 @@ def test_the_error_of_the_slider_holds_the_exact_answer(scheme, step):
     cycles = np.linspace(0.0, 8e4, 5)
     history = march_wear(model, 0.5, found, WEAR, step, scheme, cycles, settings)
     assert history.outcome is Outcome.CONVERGED
-    true = np.abs(history.wear_depth[:, 0] - exact_depths_of_motion(cycles, WEAR))[1:]
+    true = np.abs(history.wear_depth[:, 0] - depths_of_motion(cycles, WEAR))[1:]
     assert (history.wear_depth_error[1:, 0] > 0.5 * true).all()
     apart = np.abs(history.worn_volume - history.reference_volume)[1:]
     assert (apart > 0.0).all()

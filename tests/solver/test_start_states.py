@@ -25,17 +25,7 @@ from solver.structure.condensation import condense
 from tests.benchmarks.frame import measure
 from tests.random_decks import random_deck, run_deck, static_forces
 from tests.random_scenes import random_scene
-from tests.solver.models import (
-    OMEGA,
-    branch_states,
-    case_of,
-    dovetail,
-    first_point,
-    random_model,
-    scene,
-    state_at,
-    sweep_of,
-)
+from tests.solver.models import branch_states, case_of, dovetail, first_point, random_model, scene, state_at, sweep_of
 
 AUTOMATIC = SolverSettings()
 
@@ -70,7 +60,8 @@ def test_a_state_is_the_same_to_the_last_bit_whatever_else_is_asked_for(sweep):
 @pytest.mark.slow
 def test_pairs_slide_with_a_rising_load_alike_in_one_step_and_in_many():
     """Within 1.5 % of the slide, with one slide for each step 27 %."""
-    case, omega, run = case_of(dovetail(13), 0.5, OMEGA, SolverSettings(3, 64)), 1256.0, Run(1e-8)
+    omega, run = 1256.0, Run(1e-8)
+    case = case_of(dovetail(13), 0.5, omega, SolverSettings(3, 64))
     rest = state_at_rest(case, omega, run)
     assert isinstance(rest, State)
 
@@ -164,8 +155,8 @@ def test_a_fold_is_found_and_the_branch_behind_it_counted(sweep, omegas, fold):
 )
 def test_the_harmonics_of_a_node_are_checked_by_the_force_that_they_leave_out(highest, foreseen, suits):
     """The error where they were chosen grows with this force: an error above rtol, or far below, asks for others."""
-    case = case_of(random_model(2, ("3d",) * 5), 0.4, OMEGA, AUTOMATIC, Resolution(all_orders(highest), 64))
-    path, found = LoadingPath(case, 30.0, OMEGA), [first_point(case, OMEGA, load) for load in (15.0, 30.0)]
+    case = case_of(random_model(2, ("3d",) * 5), 0.4, 600.0, AUTOMATIC, Resolution(all_orders(highest), 64))
+    path, found = LoadingPath(case, 30.0, 600.0), [first_point(case, 600.0, load) for load in (15.0, 30.0)]
     checked, state = (replace(each, parameter=part) for each, part in zip(found, (0.5, 1.0), strict=True))
     before, now = left_out(checked), left_out(state)
     assert path.differs(checked, state) > VIBRATION_RECHECK

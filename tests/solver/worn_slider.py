@@ -52,7 +52,7 @@ def problem(steps: Given | None = None, rtol: float = 1e-2) -> WearProblem:
     )
 
 
-def exact_depths_of_motion(cycles: FloatArray, wear: float = WEAR) -> FloatArray:
+def depths_of_motion(cycles: FloatArray, wear: float = WEAR) -> FloatArray:
     """Depths (n,), m, for the exact motion, by Den Hartog."""
     return slider_wear_depth(cycles, lambda limit: slider_amplitude(0.1, 0.0, 1.6e5, FORCE, limit, OMEGA), wear=wear)
 
