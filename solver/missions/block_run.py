@@ -19,7 +19,7 @@ from solver.newton.run import Budget, Run
 from solver.outcome import Outcome
 from solver.results.history import StartState, first_cut_off
 from solver.results.state_report import evaluated, periodic_state
-from solver.settings import Direction, Passage
+from solver.settings import Direction, Passage, Resolution
 from solver.structure.joint import Case, build_case
 from solver.wear.problem import WearProblem, reference_of
 from solver.wear.slow_time import Guide, Integrator
@@ -104,11 +104,13 @@ class BlockInput:
         counts, law = np.array([0.0, self.block.cycles or 0.0]), self.mission.law.begun_at(self.depth)
         return WearRequest(self.mission.wear_coefficient, None, counts, law=law, ends_at_last=True)
 
-    def sweeps(self, direction: Direction, amplitude: float) -> FrequencySweep:
-        """A sweep at the depth before the block. amplitude: N."""
+    def sweeps(
+        self, direction: Direction, amplitude: float, known: tuple[tuple[float, Resolution], ...] = ()
+    ) -> FrequencySweep:
+        """A sweep at the depth before the block. amplitude: N. known: as in `FrequencySweep`."""
         settings = replace(self.mission.settings, time_limit=self.deadline - computing_time())
-        sweeps = FrequencySweep(self.model, amplitude, direction, settings)
-        sweeps.with_switching = self.with_switching
+        asked = self.model, amplitude, direction, settings
+        sweeps = FrequencySweep(*asked, with_switching=self.with_switching, known=known)
         sweeps.set_deadline(self.deadline)
         return sweeps
 

@@ -227,10 +227,9 @@ def interval_errors(states: Sequence[SweptState], area: FloatArray) -> FloatArra
 
 def states_at(given: BlockInput, frequencies: FloatArray) -> list[SweptState] | Failure:
     """States of the sweep through the range at given frequencies, ascending, Hz."""
-    states, sweeps = list[SweptState](), given.sweeps(given.passage.sweep, given.block.excitation_amplitude)
-    if given.guide is not None:
-        # errors of a reference solution are not used
-        sweeps.known = given.guide.resolutions
+    # errors of a reference solution are not used
+    known = () if given.guide is None else given.guide.resolutions
+    states, sweeps = list[SweptState](), given.sweeps(given.passage.sweep, given.block.excitation_amplitude, known)
     for index, start in sweeps.states(frequencies):
         if start.state is None:
             return Failure(start.outcome, start.message)

@@ -229,9 +229,6 @@ def drawn(kind: str, seed: int) -> Scene:
     return KINDS[kind](np.random.default_rng([seed, sorted(KINDS).index(kind)]))
 
 
-# --- textbook scenes ---
-
-
 def textbook_scenes() -> dict[str, tuple[Scene, str]]:
     """By name: the scene, and the sweep that leads to its state."""
     found = {}
@@ -248,8 +245,6 @@ def textbook_scenes() -> dict[str, tuple[Scene, str]]:
         found[f"vibro-impact {omega} {branch}"] = wall(omega, 5.0, 0.025, 100.0), sweep
     return found
 
-
-# --- a cantilever with rigid friction at its tip ---
 
 SPRINGS = {"rigid": np.inf, "soft spring": 20.0, "stiff spring": 200.0}  # N/m
 

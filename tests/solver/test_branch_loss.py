@@ -20,8 +20,6 @@ from studies import build_scene
 from tests.references import vibro_impact_orbit
 from tests.solver.models import assert_same, branch_states, case_of, march_wear
 
-# --- the branch with impacts ends, the mass falls on the other one ---
-
 OMEGA = 1.5
 FORCE = 0.02
 GAP = 0.1

@@ -16,8 +16,6 @@ from tests.solver.models import assert_same, march_wear, sweep_of
 from tests.solver.worn_slider import AREA, CYCLES, END, WEAR, march
 from tests.studies.half_space_twin import limit_depth
 
-# --- the count at which a wear is reached ---
-
 
 @pytest.mark.parametrize("scheme", ["explicit", "implicit", "adaptive"])
 def test_the_count_is_that_at_which_the_history_has_the_wear(scheme):

@@ -176,8 +176,6 @@ def test_a_kernel_is_compiled_once_for_any_resolution():
         assert len(kernel.signatures) == 1, (kernel, kernel.signatures)
 
 
-# --- elastic pairs and masses in one joint ---
-
 MIXED = ("3d", "constant_load", "one_tangent", "second_tangent", "3d", "constant_load_one_tangent")
 FREE, ELASTIC = [1, 3, 4], [0, 2, 5]
 

@@ -340,9 +340,6 @@ def test_a_reference_solution_that_fails_leaves_the_error_unknown(monkeypatch):
     assert history.outcome is Outcome.INACCURATE
 
 
-# --- what users may get wrong ---
-
-
 def test_what_is_wrong_of_a_block_is_named():
     one, other = two_blocks()
     passage = {"frequency": Passage(2.0, 3.0, 1.0), "cycles": None}

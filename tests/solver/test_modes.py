@@ -273,9 +273,6 @@ def test_stuck_and_slipping_beam_and_the_published_damping():
     assert mode.damping_ratio.max() == pytest.approx(0.16, abs=0.01)
 
 
-# --- single nonlinear mode theory ---
-
-
 def test_without_slip_the_curve_is_that_of_a_linear_oscillator():
     model = foot()
     mode = backbone(model, np.geomspace(1e-9, 1e-6, 4), 0.5)

@@ -17,8 +17,6 @@ from solver.settings import Resolution, SolverSettings, all_orders
 from solver.structure.fourier import from_complex, to_complex
 from tests.solver.models import ALL_KINDS, OMEGA, case_of, first_point, random_model, scene, state_at, worn_state
 
-# --- certificates ---
-
 TOLERANCE = SolverSettings().tolerance
 SLIDER = ("sdof_slider", 0.5, 10.0, 2 * np.pi * 160.0)
 

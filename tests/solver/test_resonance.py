@@ -37,8 +37,6 @@ def test_it_is_that_of_the_equation_of_motion(nodal_diameter):
     assert resonance_frequency(joint, at)[0] == pytest.approx(expected, rel=1e-9, nan_ok=True)
 
 
-# --- histories that follow it ---
-
 DAMPING = 20.0  # N s/m: 8 % of the critical damping of the slider
 CYCLES = np.linspace(0.0, 4e4, 6)
 BETWEEN = (180.0, 230.0)

@@ -190,8 +190,6 @@ def test_a_curve_of_a_slider_takes_few_iterations():
     assert measure(curve).iterations < 550
 
 
-# --- static and first states ---
-
 PRESS = 200.0  # N on each pair: with it the glued dovetail pulls nowhere
 
 

@@ -97,9 +97,6 @@ def test_a_response_at_a_depth_is_that_of_less_normal_force():
     assert set(worn.outcome) == {Outcome.CONVERGED}
 
 
-# --- steps and their errors ---
-
-
 def steps_and_depth(rtol):
     """Number of steps, and depth at the end, m, of an adaptive history without its reference solution."""
     model, settings = scene("sdof_slider", 13), SolverSettings(13, 128, rtol=rtol)
