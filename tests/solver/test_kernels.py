@@ -1,4 +1,4 @@
-"""Contact kernels and the law of a joint against plain twins and closed forms; `test_balance` has their derivatives."""
+"""Contact kernels and the law of a joint against plain twins and closed forms; derivatives: `test_elements`."""
 
 import ast
 from dataclasses import replace

@@ -11,7 +11,7 @@ from solver.outcome import Outcome
 from solver.settings import SolverSettings
 from solver.structure.fourier import build_basis
 from tests.solver.models import branch_states, dovetail, march_wear, random_balance, random_model
-from tests.solver.test_balance import MODELS, jacobian_by_differences
+from tests.solver.test_elements import MODELS, jacobian_by_differences
 
 FRICTION, ORDERS = 0.5, tuple(range(1, 10))
 BASIS = build_basis(ORDERS, 128)

@@ -25,7 +25,8 @@ from solver.structure.condensation import condense
 from tests.benchmarks.frame import measure
 from tests.random_decks import random_deck, run_deck, static_forces
 from tests.random_scenes import random_scene
-from tests.solver.models import branch_states, case_of, dovetail, first_point, random_model, scene, state_at, sweep_of
+from tests.solver import models
+from tests.solver.models import assert_same, branch_states, case_of, dovetail, scene, state_at, sweep_of
 
 AUTOMATIC = SolverSettings()
 
@@ -33,14 +34,6 @@ AUTOMATIC = SolverSettings()
 def starts(frequencies, sweep="up", settings=AUTOMATIC):
     found = sweep_of(dovetail(13), 0.5, 0.5, sweep, settings).states(np.array(frequencies))
     return {frequencies[index]: start for index, start in found}
-
-
-def assert_same_state(one, other):
-    """To the last bit."""
-    assert np.array_equal(one.state.displacement_h, other.state.displacement_h)
-    assert np.array_equal(one.state.start_history, other.state.start_history)
-    for name in ("response_error", "branch", "newton_iterations"):
-        assert getattr(one, name) == getattr(other, name)
 
 
 def slip_work(start):
@@ -54,7 +47,7 @@ def slip_work(start):
 def test_a_state_is_the_same_to_the_last_bit_whatever_else_is_asked_for(sweep):
     # near the resonance of the coarse sector, where it slips
     alone, together = (starts(each, sweep)[212.5] for each in ([212.5], [211.1, 212.499, 212.5, 212.501]))
-    assert_same_state(together, alone)
+    assert_same(together, alone)
 
 
 @pytest.mark.slow
@@ -130,7 +123,7 @@ def test_a_sweep_goes_on_from_each_save_to_the_last_bit(case, monkeypatch):
         sweeps.load(progress)
         again = dict(sweeps.states(np.array(frequencies)))
         for index, wanted in whole.items():
-            assert_same_state(again[index], wanted)
+            assert_same(again[index], wanted)
 
 
 @pytest.mark.slow
@@ -155,8 +148,8 @@ def test_a_fold_is_found_and_the_branch_behind_it_counted(sweep, omegas, fold):
 )
 def test_the_harmonics_of_a_node_are_checked_by_the_force_that_they_leave_out(highest, foreseen, suits):
     """The error where they were chosen grows with this force: an error above rtol, or far below, asks for others."""
-    case = case_of(random_model(2, ("3d",) * 5), 0.4, 600.0, AUTOMATIC, Resolution(all_orders(highest), 64))
-    path, found = LoadingPath(case, 30.0, 600.0), [first_point(case, 600.0, load) for load in (15.0, 30.0)]
+    case = case_of(models.random_model(2, ("3d",) * 5), 0.4, 600.0, AUTOMATIC, Resolution(all_orders(highest), 64))
+    path, found = LoadingPath(case, 30.0, 600.0), [models.first_point(case, 600.0, load) for load in (15.0, 30.0)]
     checked, state = (replace(each, parameter=part) for each, part in zip(found, (0.5, 1.0), strict=True))
     before, now = left_out(checked), left_out(state)
     assert path.differs(checked, state) > VIBRATION_RECHECK
