@@ -56,9 +56,8 @@ blocks. Slider, missions: estimated over true error at least 1.7. With 0.25 two 
 of 2000 missions, with 0.5 fewer than 20 and 30."""
 
 SMALL_SHARE = 0.1
-"""Share of rtol of what adds up: the local errors of the steps of a history; the slip work that may be creep. Dovetail,
-16 pairs, 212.5 Hz, where a pair only just slips, `rtol` 1e-2: 0.1 % off at the end; with 0.25 0.8 % off on the way,
-with 0.5 5 %."""
+"""Share of rtol of what adds up, the local errors of the steps of a history. Dovetail, 16 pairs, 212.5 Hz, where a pair
+only just slips, `rtol` 1e-2: 0.1 % off at the end; with 0.25 0.8 % off on the way, with 0.5 5 %."""
 
 Automatic = Literal["auto"]
 Scheme = Literal["explicit", "implicit", "adaptive"]
