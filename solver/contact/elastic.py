@@ -58,7 +58,7 @@ class CoulombPairs(Element):
             slide_tangent(np.flatnonzero(at.slid), path, self.basis.synthesis, starts)
         slides = np.flatnonzero(switching & (self.dofs[:, 1:] >= 0).any(axis=1))
         self.friction_tangent(slides, self.period(at), starts, (basis_t, analysis_h), out)
-        closing = np.flatnonzero(self.has_normal & switching)
+        closing = np.flatnonzero((self.dofs[:, 0] >= 0) & switching)
         mean_normal_tangent(closing, at.predicted_t, basis_t, analysis_h, out[0])
         out[1][:] /= self.state_stiffness[:, None]
 
@@ -86,6 +86,6 @@ class CoulombPairs(Element):
         own = np.zeros((len(status), 3, 3, status.shape[1]))
         own[:, 0, 0] = status == SEPARATED
         own[:, 1:, 1:] = np.eye(2)[:, :, None] - carried
-        own[:, 1:, 0] = -(self.friction_coefficient * self.has_normal)[:, None, None] * unit
+        own[:, 1:, 0] = -(self.friction_coefficient * (self.dofs[:, 0] >= 0))[:, None, None] * unit
         by_sample = 3, 0, 1, 2
         return np.ascontiguousarray(own.transpose(by_sample)), np.ascontiguousarray(carried.transpose(by_sample))

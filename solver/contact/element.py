@@ -117,11 +117,6 @@ class Element(ABC):
         return history[self.places, : self.n_history]
 
     @property
-    def has_normal(self) -> BoolArray:
-        """False (k,) for pairs without a closing displacement, whose normal force is constant."""
-        return np.asarray(self.dofs[:, 0] >= 0)
-
-    @property
     def sample_step(self) -> float:
         """Time between two samples, s."""
         return 2.0 * np.pi / (self.omega * self.basis.n_samples)

@@ -84,7 +84,7 @@ class SlidingMasses(CoulombPairs):
                 part[:, place, rows] = 0.0
             block = (slice(None), place, rows[:, None], rows)
             found.by_force[block] = np.eye(there.size) - by_predicted
-            if self.has_normal[pair]:
+            if self.dofs[pair, 0] >= 0:
                 presses = at.predicted_t[pair, 0, :, None] > 0.0
                 found.by_force[:, place, rows, 0] = np.where(presses, -friction[pair] * slopes[:, there, 4], 0.0)
             gain, loss = step_gains(self.penalty.mass[pair], self.penalty.drag[pair], step)

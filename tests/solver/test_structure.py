@@ -110,11 +110,9 @@ def test_needed_nodal_diameters_are_folded():
 
 
 def test_matrices_that_all_harmonics_share_give_what_a_matrix_for_each_gives(monkeypatch):
-    model = scene("dovetail_sector", 5, mesh=1)
-    orders = (1, 2, 3, 5)
-    each = build_structure(model, OMEGA, AMPLITUDE, orders)
+    model, orders = scene("dovetail_sector", 5, mesh=1), (1, 2, 3, 5)
+    each = build_structure(scene("dovetail_sector", 5, mesh=1), OMEGA, AMPLITUDE, orders)
     monkeypatch.setattr(condensation, "DENSE_BYTES", 0.0)
-    condensation._condensed.cache_clear()
     shared = build_structure(model, OMEGA, AMPLITUDE, orders)
     assert isinstance(each.moving, DenseStiffness)
     assert isinstance(shared.moving, SharedStiffness)

@@ -10,11 +10,20 @@ from solver.results.history import StartState
 from solver.results.state_report import LOOP_PHASES
 from solver.settings import Scheme, SolverSettings, ToTheEnd, first_resolution
 from solver.wear import slow_time
-from solver.wear.problem import WearProblem
 from solver.wear.slow_time import CERTIFIED, Course, Integrator, Node
-from solver.wear.wearing_joint import WearRequest
-from tests.solver.models import branch_states, march_wear, random_model, scene, state_at
-from tests.solver.worn_slider import AREA, COARSE, CYCLES, FRICTION, OMEGA, WEAR, depths_of_motion, exact_depths, march
+from tests.solver.models import branch_states, march_wear, random_model, scene
+from tests.solver.worn_slider import (
+    AREA,
+    COARSE,
+    CYCLES,
+    FRICTION,
+    OMEGA,
+    WEAR,
+    depths_of_motion,
+    exact_depths,
+    march,
+    problem,
+)
 
 STEPS = (8000.0, 4000.0, 2000.0, 1000.0)
 GIVEN: tuple[Scheme, ...] = ("explicit", "implicit")
@@ -97,20 +106,12 @@ def test_a_response_at_a_depth_is_that_of_less_normal_force():
     assert set(worn.outcome) == {Outcome.CONVERGED}
 
 
-def steps_and_depth(rtol):
-    """Number of steps, and depth at the end, m, of an adaptive history without its reference solution."""
-    model, settings = scene("sdof_slider", 13), SolverSettings(13, 128, rtol=rtol)
-    start, case, _ = state_at(model, FRICTION, 10.0, OMEGA, settings)
-    asked = WearRequest(WEAR, None, np.array([0.0, CYCLES[-1]]))
-    course = Integrator(np.inf).integrate(WearProblem(case, start, asked)).course
-    return len(course.ends), float(course.read(np.array([CYCLES[-1]]))["wear_depth"][0, 0])
-
-
 @pytest.mark.slow
 def test_the_slow_time_of_the_slider_is_of_second_order():
-    (few, coarse), (many, fine), (_, finest) = map(steps_and_depth, (1e-2, 1e-3, 1e-6))
-    order = np.log(abs(coarse - finest) / abs(fine - finest)) / np.log(many / few)
-    assert order > 1.7
+    courses = [Integrator(np.inf).integrate(problem(rtol=rtol)).course for rtol in (1e-2, 1e-3, 1e-6)]
+    few, many, _ = (len(course.ends) for course in courses)
+    coarse, fine, finest = (course.read(CYCLES[-1:])["wear_depth"][0, 0] for course in courses)
+    assert np.log(abs(coarse - finest) / abs(fine - finest)) / np.log(many / few) > 1.7
 
 
 @pytest.mark.parametrize(
