@@ -9,11 +9,12 @@ from functools import lru_cache
 import numpy as np
 
 from solver import build_model
-from solver.model import FloatArray, ReducedModel
+from solver.harmonic_balance.dlft import Evaluation
+from solver.model import ReducedModel
 from solver.outcome import Outcome
 from solver.results.history import StartState, WearHistory
+from solver.results.state_report import evaluated, periodic_motion
 from solver.settings import SolverSettings
-from solver.structure.fourier import synthesis, to_complex
 from solver.structure.joint import Joint
 from tests.cantilever import FRICTION, Cantilever
 from tests.contact_pair import ContactPair
@@ -36,16 +37,10 @@ class Scene(ContactPair):
         more = loads | {"gap": self.gap, "normal_load": self.normal_load, "response": self.massive}
         return build_model(self.mass, self.damping, self.stiffness, [dofs], 1.0, **more)
 
-    def orbit_next_to(self, joint: Joint, displacement_h: FloatArray) -> Orbit:
-        """The exact motion next to a state, given by its relative displacements. Raises NoPeriodicMotionError."""
-        orders, masses = joint.basis.orders, np.diag(self.mass) > 0.0
-        motion_h = np.zeros((masses.size, 2 * len(orders) + 1))
-        motion_h[masses] = joint.structure.response_h(joint.to_relative(displacement_h))
-        if self.tangent is not None and not masses[self.tangent]:
-            motion_h[self.tangent] = displacement_h[0, 1]
-        displacement = (motion_h @ synthesis(orders, np.zeros(1)))[:, 0]
-        velocity = (1j * self.omega * np.array(orders) * to_complex(motion_h)).sum(axis=1).real
-        return self.orbit_near(displacement, velocity)
+    def orbit_next_to(self, joint: Joint, at: Evaluation) -> Orbit:
+        """The exact motion next to a state. Raises NoPeriodicMotionError."""
+        motion = periodic_motion(joint, at)
+        return self.orbit_near(motion.displacement_t[:, 0], motion.velocity_t[:, 0])
 
 
 @dataclass(frozen=True)
@@ -77,7 +72,8 @@ def find(scene: Scene, settings: SolverSettings, sweep: str = "up") -> Found:
     if history.outcome is not Outcome.CONVERGED or start.state is None:
         return Found(history)
     case = case_of(*asked, start.penalty_omega, settings, start.resolution)
-    orbit = scene.orbit_next_to(case.joint(scene.omega, scene.excitation), start.state.displacement_h)
+    state = evaluated(case, start.state)
+    orbit = scene.orbit_next_to(state.joint(case), state.evaluation)
     exact, slip_work = scene.response(orbit), scene.slip_work(orbit)
     apart = float(np.linalg.norm(history.response[0] - exact) / np.linalg.norm(exact))
     return Found(history, apart, abs(float(history.wear_rate[0]) - slip_work) / (slip_work or 1.0))

@@ -21,16 +21,6 @@ def harmonic_structure(model: ReducedModel, harmonic: int) -> LinearModel:
     return LinearModel(*turned, folded.load_static, folded.load_harmonic.conj(), folded.response.conj())
 
 
-def series(values_h: FloatArray, n_samples: int) -> FloatArray:
-    """Time samples of a Fourier series."""
-    phase = 2.0 * np.pi * np.arange(n_samples) / n_samples
-    total = np.repeat(values_h[..., :1], n_samples, axis=-1)
-    for harmonic in range(1, (values_h.shape[-1] + 1) // 2):
-        total = total + values_h[..., 2 * harmonic - 1, None] * np.cos(harmonic * phase)
-        total = total + values_h[..., 2 * harmonic, None] * np.sin(harmonic * phase)
-    return total
-
-
 def project(force: FloatArray, radius: float) -> FloatArray:
     """Point of the Coulomb disc nearest to a tangential force (2,)."""
     size = float(np.hypot(*force))

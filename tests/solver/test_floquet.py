@@ -57,7 +57,7 @@ def test_the_largest_multiplier_is_that_of_the_exact_motion(kind, seed, allowed,
     scene = drawn(kind, seed)
     _, case, state = state_at(scene.model, scene.friction, scene.excitation, scene.omega, SETTINGS)
     joint, at = state.joint(case), state.evaluation
-    exact = largest(scene.orbit_next_to(joint, at.displacement_h).multipliers())
+    exact = largest(scene.orbit_next_to(joint, at).multipliers())
     assert largest(multipliers_of(build_monodromy(joint, at, 512), every=True)) == pytest.approx(exact, abs=allowed)
     assert (find_instability(case, state, Run(SETTINGS.tolerance)) is not None) == (exact > 1.0)
 

@@ -1,8 +1,7 @@
 """What is reported of states and histories: time signals, contact forces, fretting loops, outcomes."""
 
-import math
 from dataclasses import replace
-from functools import lru_cache
+from functools import lru_cache, partial
 
 import numpy as np
 import pytest
@@ -11,11 +10,11 @@ from solver.accuracy.certificate import certify
 from solver.outcome import Outcome
 from solver.results.history import first_cut_off, judge
 from solver.results.state_report import LOOP_PHASES, periodic_motion, periodic_state, report_state
-from solver.settings import FINE_SAMPLES, SolverSettings, all_orders
+from solver.settings import FINE_SAMPLES, SolverSettings
 from solver.structure.fourier import build_basis
 from studies import build_scene
 from tests.solver.models import ALL_KINDS, branch_states, march_wear, scene, worn_state
-from tests.solver.reconstruction import harmonic_structure, pair_period, series
+from tests.solver.reconstruction import harmonic_structure, pair_period
 from tests.studyrunner.faked_runs import history
 
 FRICTION = 0.4
@@ -41,15 +40,15 @@ def test_the_contact_force_is_that_of_the_plain_law(kinds):
     eps = np.column_stack([penalty.normal, penalty.tangential, penalty.tangential])
     predicted_h = state.contact_force_h + eps[:, :, None] * moved
     predicted_h[model.contact.dofs[:, 0] < 0, 0, 1:] = 0.0
-    predicted_t = series(predicted_h, SETTINGS.samples)
+    predicted_t = predicted_h @ joint.basis.synthesis
     begin = penalty.tangential[:, None] * state.start_history
     pairs = zip(predicted_t, begin, strict=True)
     forces = np.array([pair_period(predicted, FRICTION, start, 8)[0] for predicted, start in pairs])
     size = np.abs(state.contact_force_h).max()
     assert forces[:, 1:] @ joint.basis.analysis == pytest.approx(state.contact_force_h[:, 1:], abs=1e-9 * size)
     # normal forces are averaged up to the instant of opening: near those of 64 times the samples, Eq. (11)
-    many = np.maximum(series(predicted_h[:, 0], 64 * SETTINGS.samples), 0.0)
-    exact = many @ build_basis(all_orders(SETTINGS.harmonics), many.shape[1]).analysis
+    finer = build_basis(joint.basis.orders, 64 * SETTINGS.samples)
+    exact = np.maximum(predicted_h[:, 0] @ finer.synthesis, 0.0) @ finer.analysis
     kink = np.abs(np.diff(predicted_t[:, 0])).max()
     assert np.abs(state.contact_force_h[:, 0] - exact).max() < 4 * kink / SETTINGS.samples
 
@@ -152,16 +151,12 @@ def test_load_or_wear_at_the_edge_is_found_at_its_first_count():
     middle = none + [2.0, 1.0, 0.0]
     at = none.copy()
     at[2:, 2] = 1e-3
-    assert math.isnan(first_cut_off(contact, cycles, middle, middle))
-    assert first_cut_off(contact, cycles, middle + at, middle) == 20.0
-    assert first_cut_off(contact, cycles, middle, middle + at) == 20.0
-    assert first_cut_off(contact, cycles, middle + 1.0, middle) == 0.0
-    # round-off is no load, and an edge that is none does not count
-    assert math.isnan(first_cut_off(contact, cycles, middle + 1e-9 * at, middle))
-    assert math.isnan(first_cut_off(replace(contact, edge=None), cycles, middle + at, middle))
+    cut = partial(first_cut_off, contact, cycles)
+    assert [cut(middle + at, middle), cut(middle, middle + at), cut(middle + 1.0, middle)] == [20.0, 20.0, 0.0]
     # of counts without a state nothing is known
-    gone = middle + at
-    gone[2] = np.nan
-    assert first_cut_off(contact, cycles, gone, middle) == 30.0
-    gone[3] = np.nan
-    assert math.isnan(first_cut_off(contact, cycles, gone, middle))
+    gone, lost = middle + at, middle + at
+    gone[2], lost[2:] = np.nan, np.nan
+    assert cut(gone, middle) == 30.0
+    # round-off is no load, and an edge that is none does not count
+    nowhere = first_cut_off(replace(contact, edge=None), cycles, middle + at, middle)
+    assert np.isnan([cut(middle, middle), cut(middle + 1e-9 * at, middle), nowhere, cut(lost, middle)]).all()
