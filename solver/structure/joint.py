@@ -86,10 +86,6 @@ class Hold:
     stiffness: float
     position: float
 
-    def force(self, motion: FloatArray) -> float:
-        """Force of the spring, N, at mean relative displacements (n_rel,), m."""
-        return self.stiffness * (float(self.direction @ motion) - self.position)
-
 
 def held(structure: CondensedStructure, hold: Hold | None) -> CondensedStructure:
     """A condensed structure with the spring of a hold, if there is one, on its mean position."""

@@ -93,4 +93,5 @@ def free_slide(joint: Joint, at: Evaluation, *, drifts: bool = False) -> Hold | 
 def creeps(joint: Joint, hold: Hold, at: Evaluation) -> bool:
     """Whether the force of a hold is so large that the joint would creep noticeably without it."""
     friction = float(joint.contact.friction @ at.force_h[:, 0, 0])
-    return abs(hold.force(joint.to_relative(at.displacement_h)[:, 0])) > HOLD_FRACTION * friction
+    moved = float(hold.direction @ joint.to_relative(at.displacement_h)[:, 0]) - hold.position
+    return abs(hold.stiffness * moved) > HOLD_FRACTION * friction

@@ -128,8 +128,7 @@ def _rate_changes(wearing: WearingJoint, state: WearState, depths: FloatArray, *
     """Changes dg (k, n_contact), m per cycle, of the wear rates of a state with changes of the depths, m, as exact as a
     Newton direction. fixed_factors: whether the factors of a table keep their values.
     """
-    at, balance, gain = state.at, wearing.balance_of(state), wearing.gain(1.0)
-    joint = balance.joint
+    joint, at, gain = wearing.joint_of(state), state.at, wearing.gain(1.0)
     force_tangent, work_tangent = joint.law.tangent(at)
     by_work, by_force, by_depth = (gain * part for part in wearing.wearing_work.slopes(*worn_by(at)))
     growth = by_work[:, None] * work_tangent + by_force[:, None] * force_tangent[:, 0]
@@ -140,7 +139,7 @@ def _rate_changes(wearing: WearingJoint, state: WearState, depths: FloatArray, *
     if acting.any():
         rights = np.zeros((int(acting.sum()), *at.predicted_h.shape))
         rights[:, :, 0] = -closing[acting] @ joint.structure.static_stiffness
-        steps = wearing.run.steps(balance, at, rights)
+        steps = wearing.run.steps(Balance(joint, at.start_history, state.depth), at, rights)
         moved = np.array([joint.to_pairs(step).reshape(growth.shape) for step in steps])
         changes[acting] += (growth * moved).sum(axis=2)
     return changes

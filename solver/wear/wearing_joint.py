@@ -187,10 +187,6 @@ class WearingJoint:
         """The joint of a state."""
         return state.point.joint(self.case)
 
-    def balance_of(self, state: WearState) -> Balance:
-        """The balance that a state solves at constant wear depth."""
-        return Balance(self.joint_of(state), state.at.start_history, state.depth)
-
     def gain(self, cycles: float) -> FloatArray:
         """Growth of the depth over wearing work (n_contact,), m/J, in h cycles: `h k_w / alpha`, Eqs. (7), (24)."""
         return cycles * self.request.wear_coefficient / self.area
@@ -264,7 +260,8 @@ class WearingJoint:
         """The state at the frequency that is followed, with its depth and its tangential history."""
         if self.request.follow is None:
             return state
-        return self.solve(self.balance_of(state), state.at.predicted_h, state, MOST_ITERATIONS) or self.lost(state)
+        balance = Balance(self.joint_of(state), state.at.start_history, state.depth)
+        return self.solve(balance, state.at.predicted_h, state, MOST_ITERATIONS) or self.lost(state)
 
     def lost(self, state: WearState) -> Failure:
         """The end of a history whose frequency leaves its range, or beyond whose last state none is found."""

@@ -24,8 +24,7 @@ DAMPING = np.log((PEAKS + 1.0) / (PEAKS - 1.0)) / np.pi
 
 def slider(damping=0.0):
     """A mass on a rigid slider. damping: N s/m."""
-    matrices = [[MASS]], [[damping]], [[STIFFNESS]]
-    return build_model(*matrices, [[-1, 0, -1]], 1e-4, load_harmonic=[1.0], normal_load=2.0 * LIMIT)
+    return scene("sdof_slider", normal_stiffness=0.0, damping=damping)
 
 
 def foot():
