@@ -24,7 +24,7 @@ from solver.harmonic_balance.state import Failure, State, state_of
 from solver.loading_history.path import Path
 from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.modes.modal_model import LinearMode, linear_mode, modal_model
-from solver.newton.run import MOST_ITERATIONS, Bordered, Run
+from solver.newton.run import MOST_ITERATIONS, Bordered, BorderedProblem, Run
 from solver.outcome import Outcome
 from solver.packing import packable
 from solver.results.state_report import first_motion
@@ -186,7 +186,7 @@ def _resolved(mode: NonlinearMode, state: ModeState) -> ResolvedMode:
 
 
 @dataclass(frozen=True)
-class _AtAmplitude:
+class _AtAmplitude(BorderedProblem):
     """As BorderedProblem: the equations at an amplitude over the amplitude. Values: frequency, damping ratio and drive.
     Extra: x_1 (n,), m.
     """
@@ -221,9 +221,6 @@ class _AtAmplitude:
 
     def by_step(self, here: Bordered, tangent: Linearisation, step: FloatArray) -> FloatArray:
         return self._products(here.extra, first_motion(here.balance.joint, tangent.motion(step)[1], 0.0))
-
-    def fraction(self, _: Bordered, __: FloatArray) -> float:
-        return 1.0
 
 
 # --- where a mode begins ---

@@ -125,8 +125,9 @@ class BorderedProblem(Protocol):
     def by_step(self, here: Bordered, tangent: Linearisation, step: FloatArray) -> FloatArray:
         """Change (k,) of the errors with a step (n_rel, m), N, of the predicted force."""
 
-    def fraction(self, here: Bordered, change: FloatArray) -> float:
-        """Fraction of a Newton step, with a change (k,) of the values, that is taken: 1 for all, NaN to give up."""
+    def fraction(self, _: Bordered, __: FloatArray, /) -> float:
+        """Fraction of a Newton step, with a change (k,) of the values, that is taken: NaN to give up."""
+        return 1.0
 
 
 def bordered_step(
