@@ -48,8 +48,8 @@ def wall_start(sweep="up"):
 
 
 @lru_cache
-def wall_history(step, scheme, end=1000.0):
-    cycles = np.linspace(0.0, end, 21)
+def wall_history(step, scheme):
+    cycles = np.linspace(0.0, 1000.0, 21)
     return march_wear(worn_wall(), 1e-3, wall_start(), WALL_WEAR, step, scheme, cycles, IMPACT)
 
 
