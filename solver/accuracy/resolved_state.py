@@ -32,8 +32,8 @@ long where the second is right (dovetail). The friction oscillators of `SCATTERE
 one of them the solution with 27 harmonics is as wrong as that with 9."""
 
 CREEP_SHARE = 0.1
-"""Share of rtol of the slip work that may be the creep of a mass. Half and twice: sliders, masses and a
-wave are equal, an unstable ring within 7e-7."""
+"""Share of rtol of the slip work that may be the creep of a mass. Half and twice: sliders, masses and
+a wave are equal, an unstable ring within 7e-7."""
 
 SMALL_PEAK = 0.01
 """Fraction of the largest peak: errors of smaller responses are relative to this fraction. With a tenth of it blocks,

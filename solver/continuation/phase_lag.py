@@ -70,7 +70,7 @@ class _AtLag:
 
     def by_step(self, here: Bordered, tangent: Linearisation, step: FloatArray) -> FloatArray:
         # of the equation times |F^H x|, whose derivative is linear in the motion
-        return self._errors(_changes(here.balance.joint, tangent.motion(step)[1])[0], here.extra)
+        return self._errors(_changes(here.balance.joint, tangent.rest_and_motion(step)[1])[0], here.extra)
 
     def fraction(self, here: Bordered, change: FloatArray) -> float:
         return min(1.0, LARGEST_FREQUENCY_CHANGE * float(here.values[0] / max(abs(change[0]), 1e-300)))
@@ -131,7 +131,7 @@ def rise_of_response(state: Bordered, run: Run, accuracy: float) -> tuple[float,
     fixed = Balance(joint, at.start_history, at.wear_depth)
     by_frequency = frequency_derivative(fixed, at)
     (step,) = run.steps(fixed, at, [-by_frequency.force], min(FORCING, 0.1 * accuracy))
-    product, response = _changes(joint, fixed.linearise(at).motion(step)[1])
+    product, response = _changes(joint, fixed.linearise(at).rest_and_motion(step)[1])
     rise = (by_frequency.response[0] + response[0]) / first_response(joint, at)[0]
     turn = (by_frequency.product + product) / excitation_product(joint, at)
     return float(rise.real), -turn.imag

@@ -163,10 +163,10 @@ class Linearisation:
 
     def apply(self, step: FloatArray, *, roughly: bool = False) -> FloatArray:
         """Jacobian times a step (n_rel, m), N; roughly: to at least three digits."""
-        rest, motion = self.motion(step)
+        rest, motion = self.rest_and_motion(step)
         return self.joint.structure.apply(motion, roughly=roughly) + step - rest
 
-    def motion(self, step: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def rest_and_motion(self, step: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Part of a step (n_rel, m), N, that the pairs do not transmit, and their motion (n_rel, m), m."""
         joint = self.joint
         blocks = self.force_tangent, joint.law.compliance, self.growth_tangent

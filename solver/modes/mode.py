@@ -220,7 +220,7 @@ class _AtAmplitude(BorderedProblem):
         return slopes, np.stack(errors, axis=1)
 
     def by_step(self, here: Bordered, tangent: Linearisation, step: FloatArray) -> FloatArray:
-        return self._products(here.extra, first_motion(here.balance.joint, tangent.motion(step)[1], 0.0))
+        return self._products(here.extra, first_motion(here.balance.joint, tangent.rest_and_motion(step)[1], 0.0))
 
 
 # --- where a mode begins ---
