@@ -188,7 +188,7 @@ def find_start(given: BlockInput) -> tuple[StartState, EarlierSweep | None]:
         again = earlier.again(path, run, stride, with_switching=given.with_switching)
         if again is not None:
             return again, earlier
-    direction = given.mission.first if block.way == "continue" else block.way
+    direction = given.mission.first_sweep if block.way == "continue" else block.way
     sweeps = given.sweeps(direction, block.excitation_amplitude)
     _, start = next(sweeps.states(np.array([block.ends[0]])))
     present = sweeps.present
