@@ -10,9 +10,10 @@ from solver.accuracy.refinement import DIFFERENCE_SAFETY
 from solver.clock import computing_time
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import Failure
+from solver.loading_history.given_nodes import EarlierSweep
 from solver.loading_history.path import LoadingPath
 from solver.loading_history.start_states import FrequencySweep
-from solver.loading_history.sweep import STEPS_OF_REFERENCE, EarlierSweep
+from solver.loading_history.sweep import STEPS_OF_REFERENCE
 from solver.missions.mission import Block, MissionRequest
 from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.newton.run import Budget, Run
