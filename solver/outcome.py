@@ -181,12 +181,6 @@ def is_known_to(error: float, rtol: float) -> str:
     return f"is {known_to(error, rtol)}"
 
 
-def describe_inaccurate(response_error: float, wear_rate_error: float, rtol: float) -> str:
-    """Sentence about the larger one of two relative errors of a state, which is above `rtol`."""
-    error, name = max((wear_rate_error, "wear rate"), (response_error, "response"))
-    return f"the {name} {is_known_to(error, rtol)}"
-
-
 def in_digits(value: float, digits: int = 6) -> str:
     """Text of a number with so many significant digits, without an exponent below 1e15: 2000 for "2e+03"."""
     return f"{float(f'{value:.{digits}g}'):.15g}"

@@ -132,7 +132,7 @@ def response_curve(
         # a branch may turn back behind its start before it comes to the last value
         back = max(2.0 * first - last, SMALL * first) if first > 0.0 else -np.inf
         span = abs(last - first) / (SMOOTH_CHANGE * _FEWEST_STEPS)
-        begun, run = replace(found, history=balance.history, parameter=float(first)), Run(settings.tolerance)
+        begun, run = replace(found, next_history=balance.history, parameter=float(first)), Run(settings.tolerance)
         arc = Arc(lambda parameter: Balance(path.joint_at(parameter), balance.history), path.slope, begun, span, run)
         branch = _follow_branch(arc, last, back, most, over_frequency)
     return _reported(path, branch, errors)
@@ -178,7 +178,7 @@ def _reported(path: LoadingPath, branch: _Branch, errors: bool) -> ResponseCurve
     stability: list[Stability] = []
     balances: list[HarmonicBalance] = []
     for index, point in enumerate(points):
-        balance, at = Balance(path.joint_at(point.parameter), point.history), point.evaluation
+        balance, at = Balance(path.joint_at(point.parameter), point.next_history), point.evaluation
         joint, run = balance.joint, Run(case.settings.tolerance)
         response[index], peak[index] = first_response(joint, at), largest_responses(joint, at)
         if errors:

@@ -31,15 +31,6 @@ _CELLS = 32  # of the grid for events, of which a piece of an integral takes at 
 
 
 @dataclass(frozen=True)
-class PairPhase(Phase):
-    """Rows (m,) that give normal force, N, slip velocity, m/s, and the place, m, of an elastic slider that moves."""
-
-    normal: FloatArray
-    slip: FloatArray
-    place: FloatArray | None
-
-
-@dataclass(frozen=True)
 class ContactPair(PiecewiseLinear):
     """`M x'' + C x' + K x + lambda = static + Re(harmonic exp(i omega t))`, n displacements.
 
@@ -127,7 +118,7 @@ class ContactPair(PiecewiseLinear):
         return flow, (forces - mass @ acceleration)[self._place] if held else self._one(0) * 0.0
 
     @cached_property
-    def phases(self) -> dict[str, PairPhase]:
+    def phases(self) -> dict[str, Phase]:
         """Of these "forward", "backward" and "stick" where there is a tangent, else "closed"; "open"."""
         phases, closed = {}, self._masses()
         if self.normal is not None:
@@ -151,7 +142,7 @@ class ContactPair(PiecewiseLinear):
             if self.elastic:
                 flow[self._place] = slip
             guards += [] if self.normal is None else [normal]
-            phases[name] = PairPhase(flow, np.array(guards), normal, slip, None if name == "stick" else place)
+            phases[name] = Phase(flow, np.array(guards), normal, slip, None if name == "stick" else place)
         if self.normal is not None:
             phases["open"] = self._open()
         return phases
@@ -164,7 +155,7 @@ class ContactPair(PiecewiseLinear):
         force = self._left(t, closed) - sign * self.friction * self._left(n, closed)
         return force / (self._k[t, t] - sign * self.friction * self._k[n, t])
 
-    def _open(self) -> PairPhase:
+    def _open(self) -> Phase:
         nothing, rows = np.zeros(2 * self.n + 3), self._masses()
         free = [self.normal, self.tangent] if self.elastic else [self.normal]
         rows[free] = np.linalg.solve(self._k[np.ix_(free, free)], [self._left(index, rows) for index in free])
@@ -173,7 +164,7 @@ class ContactPair(PiecewiseLinear):
         if place is not None:
             flow[self._place] = place @ flow
         guards = (self.gap * self._one(-1) - rows[self.normal])[np.newaxis]
-        return PairPhase(flow, guards, nothing, nothing, place)
+        return Phase(flow, guards, nothing, nothing, place)
 
     def next_phase(self, name: str, y: FloatArray) -> tuple[str, FloatArray]:
         """The phase after an event, and y with the event exactly on its switch.

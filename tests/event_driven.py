@@ -35,10 +35,14 @@ class Phase:
     """A linear piece of the motion.
 
     flow (m, m): `y' = flow y`, 1/s. guards (n_guards, m): the phase lasts while every `guards @ y` is positive.
+    Rows (m,) that give normal force, N, slip velocity, m/s, and the place, m, of an elastic slider that moves.
     """
 
     flow: FloatArray
     guards: FloatArray
+    normal: FloatArray
+    slip: FloatArray
+    place: FloatArray | None
 
 
 @dataclass(frozen=True)
@@ -175,12 +179,8 @@ class Orbit:
 
     def multipliers(self) -> NDArray[np.complex128]:
         """Floquet multipliers (2 n,), largest first, by differences of the period map."""
-        y, name, system = self.segments[0].start, self.segments[0].phase, self.system
-        length, columns = 1e-6 * np.abs(y[: 2 * system.n]).max(), []
-        for moved in length * np.eye(y.size)[: 2 * system.n]:
-            ends = [system.advance(system.phase_at(name, at), at, system.period)[1] for at in (y + moved, y - moved)]
-            columns.append((ends[0] - ends[1])[: 2 * system.n] / (2.0 * length))
-        found = np.linalg.eigvals(np.array(columns).T)
+        y, name, free = self.segments[0].start, self.segments[0].phase, list(range(2 * self.system.n))
+        found = np.linalg.eigvals(_period_slope(self.system, name, y, np.full(len(free), np.abs(y[free]).max()), free))
         return found[np.lexsort((-found.imag, -np.abs(found)))]
 
     def harmonic(self, dof: int, order: int = 1) -> complex:
@@ -253,13 +253,9 @@ def close_orbit(system: PiecewiseLinear, name: str, y: FloatArray, start_time: f
         if orbit.residual <= _CLOSED:
             return orbit
         scale = _scale(orbit)
-        columns = []
-        for index in free:
-            step = 1e-6 * scale[index] * np.eye(len(y))[index]
-            ends = [system.advance(system.phase_at(name, y + s), y + s, system.period)[1] for s in (step, -step)]
-            columns.append((ends[0] - ends[1])[free] / (2e-6 * scale[index]))
+        slope = _period_slope(system, name, y, scale[free], free)
         # Least squares: a mass that sticks for ever may do so in more than one place.
-        jacobian = (np.array(columns).T - np.eye(len(free))) * scale[free] / scale[free][:, np.newaxis]
+        jacobian = (slope - np.eye(len(free))) * scale[free] / scale[free][:, np.newaxis]
         full = scale[free] * np.linalg.lstsq(jacobian, defect / scale[free], rcond=1e-9)[0]
         for halving in range(8):
             moved = y.copy()
@@ -272,6 +268,16 @@ def close_orbit(system: PiecewiseLinear, name: str, y: FloatArray, start_time: f
             break
         name, y, orbit, defect = moved_name, moved, moved_orbit, moved_defect
     raise NoPeriodicMotionError("Newton's method does not close the period")
+
+
+def _period_slope(system: PiecewiseLinear, name: str, y: FloatArray, sizes: FloatArray, free: list[int]) -> FloatArray:
+    """Derivative of some entries (k,) of the state a period later by themselves, by central differences."""
+    columns = []
+    for index, length in zip(free, 1e-6 * sizes, strict=True):
+        step = length * np.eye(len(y))[index]
+        ends = [system.advance(system.phase_at(name, at), at, system.period)[1] for at in (y + step, y - step)]
+        columns.append((ends[0] - ends[1])[free] / (2.0 * length))
+    return np.array(columns).T
 
 
 def _defect(

@@ -195,7 +195,7 @@ def law_errors(joint: Joint, point: State) -> dict[str, float]:
     largest_force = max(np.abs(force).max(), np.abs(condensed.force_h[:, 0]).max(), 1e-300)
     length = max(np.abs(moved).max(), np.abs(gap).max(), 1e-300)
     normal, tangential = force[:, 0], np.linalg.norm(force[:, 1:], axis=1)
-    slip = moved[:, 1:] - at.history
+    slip = moved[:, 1:] - at.start_history
     slid, limit = np.linalg.norm(slip, axis=1), friction * normal
     closed = normal > 0.0
     out_of_balance = condensed.static_stiffness @ moved.ravel() + force.ravel() - condensed.force_h[:, 0]

@@ -23,7 +23,7 @@ from solver.structure.joint import Joint
 VIOLATION_LIMITS = {
     "penetration": 0.1,
     **dict.fromkeys(("cone_violation", "energy_error"), 0.05),
-    **dict.fromkeys(("tension", "periodicity_error"), SMALL),
+    **dict.fromkeys(("tension", "periodicity_error"), 1e-3),
 }
 """Limits of the violations. Largest ones of good states with 3 to 41 harmonics: penetration 0.08 (vibro-impact with one
 harmonic, which is far off, 0.13; underplatform damper 0.04), cone 0.018, energy 0.01 (unstable ring 0.016), others

@@ -19,16 +19,7 @@ from solver.harmonic_balance.state import State, first_response, largest_respons
 from solver.model import BoolArray, ComplexArray, FloatArray
 from solver.newton.run import Run
 from solver.packing import packable
-from solver.settings import (
-    NEGLIGIBLE,
-    ROUND_OFF,
-    SMALL,
-    SMALL_SHARE,
-    Resolution,
-    SolverSettings,
-    all_orders,
-    samples_for,
-)
+from solver.settings import NEGLIGIBLE, ROUND_OFF, SMALL, Resolution, SolverSettings, all_orders, samples_for
 from solver.structure.joint import Case, Joint
 
 HARMONIC_LEVELS = (1, 3, 5, 9, 13, 19, 27, 39, 55, 79, 115, 165, 235, 331, 469)
@@ -39,6 +30,10 @@ CONTRACTED = 1e-2
 """Residual after two steps towards a longer series up to which the first of them does not count: it may be 15 times too
 long where the second is right (dovetail). The friction oscillators of `SCATTERED_SAFETY` often do not come so near; of
 one of them the solution with 27 harmonics is as wrong as that with 9."""
+
+CREEP_SHARE = 0.1
+"""Share of rtol of the slip work that may be the creep of a mass. Half and twice: sliders, masses and
+a wave are equal, an unstable ring within 7e-7."""
 
 SMALL_PEAK = 0.01
 """Fraction of the largest peak: errors of smaller responses are relative to this fraction. With a tenth of it blocks,
@@ -124,7 +119,7 @@ class ResolvedState:
 
     def at_rest(self, run: Run) -> ResolvedState:
         """The state with its sliding masses at rest: their creep is slip and would count as wear."""
-        fraction = SMALL_SHARE * self.case.settings.rtol
+        fraction = CREEP_SHARE * self.case.settings.rtol
         if not ratchets(self.joint, self.point.evaluation, fraction):
             return self
         return ResolvedState(self.case, shake_down(self.joint, self.point, fraction, run))

@@ -20,12 +20,12 @@ from solver.settings import ROUND_OFF
 class CoulombPairs(Element):
     """Pairs that rub and open. The history is the corrected slip X_T."""
 
-    def march(self, predicted_h: FloatArray, history: FloatArray, first: FloatArray | None, /) -> Marched:  # noqa: D102
+    def march(self, predicted_h: FloatArray, history: FloatArray, before_t: FloatArray | None, /) -> Marched:  # noqa: D102
         predicted_t = predicted_h @ self.basis.synthesis
         pairs, begin = np.arange(len(history)), history * self.penalty.tangential[:, None]
         start = begin.copy()
-        if first is not None:
-            slide_along(pairs, Path(first, predicted_t, self.friction_coefficient, begin), start)
+        if before_t is not None:
+            slide_along(pairs, Path(before_t, predicted_t, self.friction_coefficient, begin), start)
         period = new_period(predicted_t, self.friction_coefficient, start)
         limit = friction_limit(self.friction_coefficient, np.maximum(predicted_t[:, 0].max(axis=1), 0.0))
         # a hundredth of the usual tolerance of the residual, 1e-8, so that the residual does not show the change
@@ -45,20 +45,20 @@ class CoulombPairs(Element):
         marched = at.predicted_t, self.friction_coefficient, at.start, at.force_t, at.state_t, at.status_t
         return Period(*marched, at.periods, at.slip_work, at.slip_work)
 
-    def tangent(  # noqa: D102
-        self, at: Marched, history: FloatArray | None, first: FloatArray | None, out: Tangents, /
+    def switching_tangent(  # noqa: D102
+        self, at: Marched, history: FloatArray | None, before_t: FloatArray | None, out: Tangents, /
     ) -> None:
         # an open pair transmits nothing
         switching = ~(at.stuck | (at.status_t == SEPARATED).all(axis=1))
         basis_t, analysis_h = (part.T.copy() for part in (self.basis.synthesis, self.basis.analysis))
         starts = np.zeros((switching.size, 2, 3 * len(analysis_h)))
-        if first is not None and history is not None:
+        if before_t is not None and history is not None:
             start = history * self.penalty.tangential[:, None]
-            path = Path(first, at.predicted_t, self.friction_coefficient, start)
+            path = Path(before_t, at.predicted_t, self.friction_coefficient, start)
             slide_tangent(np.flatnonzero(at.slid), path, self.basis.synthesis, starts)
         slides = np.flatnonzero(switching & (self.dofs[:, 1:] >= 0).any(axis=1))
         self.friction_tangent(slides, self.period(at), starts, (basis_t, analysis_h), out)
-        closing = np.flatnonzero(self.has_normal & switching)
+        closing = np.flatnonzero((self.dofs[:, 0] >= 0) & switching)
         mean_normal_tangent(closing, at.predicted_t, basis_t, analysis_h, out[0])
         out[1][:] /= self.state_stiffness[:, None]
 
@@ -86,6 +86,6 @@ class CoulombPairs(Element):
         own = np.zeros((len(status), 3, 3, status.shape[1]))
         own[:, 0, 0] = status == SEPARATED
         own[:, 1:, 1:] = np.eye(2)[:, :, None] - carried
-        own[:, 1:, 0] = -(self.friction_coefficient * self.has_normal)[:, None, None] * unit
+        own[:, 1:, 0] = -(self.friction_coefficient * (self.dofs[:, 0] >= 0))[:, None, None] * unit
         by_sample = 3, 0, 1, 2
         return np.ascontiguousarray(own.transpose(by_sample)), np.ascontiguousarray(carried.transpose(by_sample))

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, fields
-from typing import TYPE_CHECKING, Any, ClassVar
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -96,21 +97,31 @@ class Element(ABC):
     basis: FourierBasis
     omega: float
 
-    # whether the law depends on velocities, and the length of the history
-    rate_dependent: ClassVar[bool] = False
-    n_history: ClassVar[int] = 2
+    @property
+    def rate_dependent(self) -> bool:
+        """Whether the law depends on velocities."""
+        return False
 
     @property
-    def has_normal(self) -> BoolArray:
-        """False (k,) for pairs without a closing displacement, whose normal force is constant."""
-        return np.asarray(self.dofs[:, 0] >= 0)
+    def n_history(self) -> int:
+        """Length of the history of a pair."""
+        return 2
+
+    @property
+    def moves_on(self) -> BoolArray:
+        """Pairs (k,) whose mean position the law alone does not determine: masses."""
+        return np.full(self.places.size, self.rate_dependent)
+
+    def own(self, history: FloatArray) -> FloatArray:
+        """The history of these pairs in that of all of the joint."""
+        return history[self.places, : self.n_history]
 
     @property
     def sample_step(self) -> float:
         """Time between two samples, s."""
         return 2.0 * np.pi / (self.omega * self.basis.n_samples)
 
-    @property
+    @cached_property
     def compliance(self) -> ComplexArray:
         """Displacement per force (k, 3, H+1), m/N, in each harmonic: 1 / eps."""
         return np.repeat((1.0 + 0.0j) / self.penalty.stiffness[:, :, None], len(self.basis.orders) + 1, axis=2)
@@ -120,13 +131,21 @@ class Element(ABC):
         """Tangential state over slip (k,), N/m."""
         return self.penalty.tangential
 
+    def motion(self, correction: FloatArray) -> FloatArray:
+        """Motion (k, 3, m, ...), m, relative to `origin`, from predicted less contact force, N, Eq. (12)."""
+        return _scaled(correction, self.compliance)
+
+    def force(self, motion: FloatArray) -> FloatArray:
+        """Predicted less contact force (k, 3, m), N, of a motion, m, Eqs. (10), (12); undoes `motion`."""
+        return _scaled(motion, 1.0 / self.compliance)
+
     @abstractmethod
-    def march(self, predicted_h: FloatArray, history: FloatArray, first: FloatArray | None, /) -> Marched:
+    def march(self, predicted_h: FloatArray, history: FloatArray, before_t: FloatArray | None, /) -> Marched:
         """The period under a predicted force p (k, 3, m), N: the contact force lambda at its samples, by the relative
         displacement `u = (p - lambda) / eps`, which is 0 where a pair without wear just closes. The force in a
         direction that a pair does not have is p.
 
-        first (k, 3, N): predicted force, N, from which it has slowly come; None where it was always the same.
+        before_t (k, 3, N): predicted force, N, from which it has slowly come; None where it was always the same.
         """
 
     def marched(self, predicted_t: FloatArray, force_t: FloatArray, **others: Any) -> Marched:
@@ -146,10 +165,20 @@ class Element(ABC):
         }
         return Marched(predicted_t, force_t, **{**nothing, **others})
 
-    def tangent(self, at: Marched, _: FloatArray | None, __: FloatArray | None, out: Tangents, /) -> None:
-        """Exact derivatives by the harmonics of the predicted force, with the periodicity, of pairs that neither stick
-        nor stand open during the whole period, into `out`; with the way from history and `first` force of `march`,
-        where these are given. By default from `sample_tangents`, without slip work.
+    def tangent(self, at: Marched, history: FloatArray | None = None, before_t: FloatArray | None = None) -> Tangents:
+        """Exact derivatives by the harmonics of the predicted force, with the periodicity, and with the way from
+        history and force of `march`, where these are given. Entries of displacements that a pair does not have are
+        without meaning.
+        """
+        k, size = len(at.start), 3 * at.force_h.shape[2]
+        out = np.zeros((k, size, size)), np.zeros((k, size))
+        self.switching_tangent(at, history, before_t, out)
+        out[0][at.stuck] = np.eye(size)
+        return out
+
+    def switching_tangent(self, at: Marched, _: FloatArray | None, __: FloatArray | None, out: Tangents, /) -> None:
+        """`tangent` of pairs that neither stick nor stand open during the whole period, into `out`. By default from
+        `sample_tangents`, without slip work.
         """
         own, carried = self.sample_tangents(at)
         synthesis, analysis = self.basis.synthesis, self.basis.analysis
@@ -238,3 +267,16 @@ class Element(ABC):
         samples.
         """
         return np.zeros_like(series_t)
+
+
+def _scaled(values_h: FloatArray, factor: ComplexArray) -> FloatArray:
+    """Series (k, 3, m, ...) with their complex amplitudes times the factor (k, 3, H+1) of each harmonic."""
+    tail = (1,) * (values_h.ndim - 3)
+    real, imaginary = (part.reshape(*factor.shape, *tail) for part in (factor.real, factor.imag))
+    cosine, sine = values_h[:, :, 1::2], values_h[:, :, 2::2]
+    scaled = np.empty_like(values_h)
+    scaled[:, :, 0] = real[:, :, 0] * values_h[:, :, 0]
+    # a complex amplitude is cosine - i sine
+    scaled[:, :, 1::2] = real[:, :, 1:] * cosine + imaginary[:, :, 1:] * sine
+    scaled[:, :, 2::2] = real[:, :, 1:] * sine - imaginary[:, :, 1:] * cosine
+    return scaled

@@ -24,7 +24,9 @@ class SlidingMasses(CoulombPairs):
     which the friction alone does not determine.
     """
 
-    rate_dependent = True
+    @property
+    def rate_dependent(self) -> bool:  # noqa: D102
+        return True
 
     @cached_property
     def masses(self) -> Masses:
@@ -33,7 +35,7 @@ class SlidingMasses(CoulombPairs):
         line = np.where(tangents.sum(axis=1) == 1, np.argmax(tangents, axis=1), -1)
         return Masses(self.penalty.mass, self.penalty.drag, line, self.sample_step)
 
-    @property
+    @cached_property
     def compliance(self) -> ComplexArray:
         """As in Element; tangential ones are those of the marched masses."""
         found, penalty, orders = super().compliance, self.penalty, np.array(self.basis.orders, np.float64)
@@ -82,7 +84,7 @@ class SlidingMasses(CoulombPairs):
                 part[:, place, rows] = 0.0
             block = (slice(None), place, rows[:, None], rows)
             found.by_force[block] = np.eye(there.size) - by_predicted
-            if self.has_normal[pair]:
+            if self.dofs[pair, 0] >= 0:
                 presses = at.predicted_t[pair, 0, :, None] > 0.0
                 found.by_force[:, place, rows, 0] = np.where(presses, -friction[pair] * slopes[:, there, 4], 0.0)
             gain, loss = step_gains(self.penalty.mass[pair], self.penalty.drag[pair], step)

@@ -70,7 +70,7 @@ class Arc:
     def state_of(self, here: Bordered) -> State:
         """State of the branch from an evaluation with the scaled parameter."""
         found = state_of(here.balance.joint, here.at, float(here.values[0] * self.span))
-        return replace(found, history=self.start.history)
+        return replace(found, next_history=self.start.next_history)
 
     def tangent(self, state: State, along: FloatArray) -> FloatArray | None:
         """Unit tangent of the branch, of the sign of a direction `along`; None where the tangent is not defined."""
@@ -112,7 +112,7 @@ class Arc:
         fraction = (target - before.parameter) / (after.parameter - before.parameter)
         one, other = before.evaluation.predicted_h, after.evaluation.predicted_h
         found = self.run.state(self.balance_at(target), one + fraction * (other - one), target, NEAR_ITERATIONS)
-        return None if found is None else replace(found, history=self.start.history)
+        return None if found is None else replace(found, next_history=self.start.next_history)
 
     def _fold(self, state: State, tangent: FloatArray, after: State) -> State:
         """State with the extreme parameter between two states, by bisection of the length; tangent: at the first."""

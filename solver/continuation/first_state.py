@@ -53,7 +53,7 @@ def solve_first_state(case: Case, omega: float, excitation_amplitude: float, run
     if isinstance(rest, Failure):
         return rest
     quiet, unstable = case.joint(omega, 0.0), False
-    whole = Balance(case.joint(omega, excitation_amplitude), rest.history)
+    whole = Balance(case.joint(omega, excitation_amplitude), rest.next_history)
 
     def balance_from(load_factor: float, state: State) -> Balance:
         return balance_after(case.joint(omega, load_factor * excitation_amplitude), state)
@@ -62,8 +62,9 @@ def solve_first_state(case: Case, omega: float, excitation_amplitude: float, run
     slid = None if sliding is None else run.state(whole, sliding, 1.0, NEAR_ITERATIONS)
     if slid is not None and run.is_stable(whole.joint, slid.evaluation):
         return slid
+    friction = rest.evaluation.force_h[:, 1:, 0]
     for fraction in (0.0, RELIEF):
-        relieved = Balance(quiet, relieved_history(quiet, rest, fraction))
+        relieved = Balance(quiet, quiet.law.relieved(rest.next_history, fraction * friction))
         begun = run.state(relieved, rest.evaluation.predicted_h, 0.0) if fraction else rest
         if begun is None:
             continue
@@ -83,7 +84,7 @@ def state_at_rest(case: Case, omega: float, run: Run) -> State | Failure:
     static = solve_static_state(quiet, run)
     if isinstance(static, Failure):
         return static
-    balance, at, orders = Balance(quiet, static.history), static.evaluation, case.resolution.orders
+    balance, at, orders = Balance(quiet, static.next_history), static.evaluation, case.resolution.orders
     start = balance.predict(*(change_orders(part, (), orders) for part in (at.displacement_h, at.force_h)))
     said = f"the static state is not found again with {case.resolution.highest} harmonics"
     return run.state(balance, start, 0.0) or Failure(Outcome.START_FAILED, said)
@@ -108,11 +109,6 @@ def sliding_start(balance: Balance, rest: State) -> FloatArray | None:
     return balance.predict(motion_h, force_h)
 
 
-def relieved_history(joint: Joint, rest: State, fraction: float) -> FloatArray:
-    """Tangential history (n_contact, 2), m, that reduces the friction forces of a state at rest by a fraction."""
-    return joint.law.relieved(rest.history, fraction * rest.evaluation.force_h[:, 1:, 0])
-
-
 def solve_static_state(joint: Joint, run: Run) -> State | Failure:
     """Static state with unilateral contact and friction, Eqs. (3), (4) and (8), under a load that rises from zero.
 
@@ -124,9 +120,9 @@ def solve_static_state(joint: Joint, run: Run) -> State | Failure:
     n_steps = LOAD_STEPS if contact.gap.any() or not contact.has_normal.all() else 1
     unmoved = np.zeros((contact.n_contact, 3, 1))
     rest = Balance(static_joint(joint, 0.0), np.zeros((contact.n_contact, joint.law.n_history)))
-    state = replace(state_of(rest.joint, rest.evaluate(rest.predict(unmoved, unmoved))), history=rest.history)
+    state = replace(state_of(rest.joint, rest.evaluate(rest.predict(unmoved, unmoved))), next_history=rest.history)
     for step in range(1, n_steps + 1):
-        balance = Balance(static_joint(joint, step / n_steps), state.history)
+        balance = Balance(static_joint(joint, step / n_steps), state.next_history)
         before = state.evaluation.predicted_h
         start = balance.joint.structure.force_h if step == 1 else before * (step / (step - 1.0))
         found: State | Failure | None = run.state(balance, start)
@@ -151,7 +147,7 @@ def _settle(balance: Balance, before: Evaluation, run: Run) -> State | Failure:
             viscosity /= SMALLEST_STEP_RATIO**2
             continue
         before = ahead.evaluation
-        balance = replace(balance, history=ahead.history)
+        balance = replace(balance, history=ahead.next_history)
         end = run.state(balance, balance.predict(before.displacement_h, before.force_h), most=NEAR_ITERATIONS)
         if end is not None:
             return end

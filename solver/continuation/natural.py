@@ -159,9 +159,11 @@ def shake_down(joint: Joint, state: State, fraction: float, run: Run) -> State:
 def _shifted(joint: Joint, state: State, run: Run) -> tuple[State, bool]:
     """As `follow_naturally`, along the history of the masses from that of a state to that which the state leaves."""
     at = state.evaluation
-    shift = np.where(joint.law.moves_on[:, None], joint.law.final_history(at, at.displacement_h) - at.history, 0.0)
+    shift = np.where(
+        joint.law.moves_on[:, None], joint.law.final_history(at, at.displacement_h) - at.start_history, 0.0
+    )
 
     def balance_from(part: float, _: State) -> Balance:
-        return Balance(joint, at.history + part * shift, at.wear_depth)
+        return Balance(joint, at.start_history + part * shift, at.wear_depth)
 
     return follow_naturally(balance_from, replace(state, parameter=0.0), 1.0, run)

@@ -37,16 +37,16 @@ frequency of a worn slider differs by 0.3 %, within its error of 1.3 %."""
 
 def phase_lag(joint: Joint, at: Evaluation) -> float:
     """Lag of the vibration behind the excitation, rad, from -pi/2 to 3 pi/2; 0 where nothing moves."""
-    product = excitation_product(joint, at.displacement_h)
+    product = excitation_product(joint, at)
     free = np.abs(to_complex(at.predicted_h)[:, 0]) / joint.relative_penalty
     if abs(product) <= ROUND_OFF * float(np.abs(joint.structure.drive) @ free):
         return 0.0
     return (-cmath.phase(product) + 0.5 * math.pi) % (2 * math.pi) - 0.5 * math.pi
 
 
-def excitation_product(joint: Joint, displacement_h: FloatArray) -> complex:
-    """`F^H x`, N m, of excitation and displacements in the first harmonic, from the motion (n_contact, 3, 2H+1), m."""
-    return _changes(joint, displacement_h)[0] + joint.structure.drive_offset
+def excitation_product(joint: Joint, at: Evaluation) -> complex:
+    """`F^H x`, N m, of excitation and displacements in the first harmonic."""
+    return _changes(joint, joint.to_relative(at.displacement_h))[0] + joint.structure.drive_offset
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,7 @@ class _AtLag:
         joint = self.case.joint(float(values[0]), self.balance.joint.excitation_amplitude)
         balance = replace(self.balance, joint=joint)
         at = balance.evaluate(predicted_h)
-        product = excitation_product(joint, at.displacement_h)
+        product = excitation_product(joint, at)
         return Bordered(balance, at, values, self._errors(product, product), extra=product)
 
     def by_values(self, here: Bordered) -> tuple[list[FloatArray], FloatArray]:
@@ -70,7 +70,7 @@ class _AtLag:
 
     def by_step(self, here: Bordered, tangent: Linearisation, step: FloatArray) -> FloatArray:
         # of the equation times |F^H x|, whose derivative is linear in the motion
-        return self._errors(_changes(here.balance.joint, tangent.motion(step))[0], here.extra)
+        return self._errors(_changes(here.balance.joint, tangent.rest_and_motion(step)[1])[0], here.extra)
 
     def fraction(self, here: Bordered, change: FloatArray) -> float:
         return min(1.0, LARGEST_FREQUENCY_CHANGE * float(here.values[0] / max(abs(change[0]), 1e-300)))
@@ -98,7 +98,7 @@ def solve_at_peak(
 
     Arguments as in `solve_at_lag`. Along the frequency the wear depth is constant, also in an implicit step.
     """
-    below, above, accuracy = 0.0, math.pi, accepted_rise(case.settings.rtol)
+    below, above, accuracy = 0.0, math.pi, PEAK_RISE * case.settings.rtol
     last, rise_before = lag, 0.0
     for _ in range(ATTEMPTS):
         found = solve_at_lag(case, balance, start, lag, run, most)
@@ -121,11 +121,6 @@ def solve_at_peak(
     return None
 
 
-def accepted_rise(rtol: float) -> float:
-    """Rise of the logarithm of an amplitude with the phase lag, 1/rad, at which the amplitude counts as the largest."""
-    return PEAK_RISE * rtol
-
-
 def rise_of_response(state: Bordered, run: Run, accuracy: float) -> tuple[float, float]:
     """Changes along the frequency at fixed wear depth and tangential history, both s/rad: of the logarithm of the
     amplitude of the first response, in the first harmonic, and of the lag.
@@ -133,12 +128,12 @@ def rise_of_response(state: Bordered, run: Run, accuracy: float) -> tuple[float,
     accuracy: first change over the second one that does not count.
     """
     joint, at = state.balance.joint, state.at
-    fixed = Balance(joint, at.history, at.wear_depth)
+    fixed = Balance(joint, at.start_history, at.wear_depth)
     by_frequency = frequency_derivative(fixed, at)
     (step,) = run.steps(fixed, at, [-by_frequency.force], min(FORCING, 0.1 * accuracy))
-    product, response = _changes(joint, fixed.linearise(at).motion(step))
+    product, response = _changes(joint, fixed.linearise(at).rest_and_motion(step)[1])
     rise = (by_frequency.response[0] + response[0]) / first_response(joint, at)[0]
-    turn = (by_frequency.product + product) / excitation_product(joint, at.displacement_h)
+    turn = (by_frequency.product + product) / excitation_product(joint, at)
     return float(rise.real), -turn.imag
 
 
@@ -154,12 +149,12 @@ def frequency_derivative(balance: Balance, at: Evaluation) -> FrequencySlope:
     # longer than usual: the round-off of the static forces is small against the change of all others
     length = 10.0 * DIFFERENCE * joint.omega
     ahead = replace(balance, joint=replace(joint, omega=joint.omega + length)).evaluate(at.predicted_h)
-    product, response = _changes(joint, (ahead.displacement_h - at.displacement_h) / length)
+    product, response = _changes(joint, joint.to_relative((ahead.displacement_h - at.displacement_h) / length))
     force = slope.force + (ahead.residual - at.residual) / length
     return FrequencySlope(force, slope.product + product, slope.response + response)
 
 
 def _changes(joint: Joint, motion_h: FloatArray) -> tuple[complex, ComplexArray]:
-    """Changes of `F^H x`, N m, and of the responses (n_response,), m, in the first harmonic with a motion, m."""
-    first = to_complex(joint.to_relative(motion_h))[:, 0]
+    """Changes of `F^H x`, N m, and of the responses (n_response,), m, with a motion (n_rel, m), m, in harmonic 1."""
+    first = to_complex(motion_h)[:, 0]
     return complex(joint.structure.drive @ first), np.asarray(joint.structure.dynamic_response[0] @ first)

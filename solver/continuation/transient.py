@@ -24,7 +24,7 @@ from solver.harmonic_balance.state import Failure, State
 from solver.model import ComplexArray, FloatArray, Matrix
 from solver.newton.run import SHORTEST_STEP, Run
 from solver.outcome import Outcome
-from solver.settings import ROUND_OFF, SMALL
+from solver.settings import ROUND_OFF
 from solver.structure.condensation import condense, whole_motion
 from solver.structure.fourier import from_complex, with_static
 from solver.structure.harmonic_stiffness import DenseStiffness
@@ -38,7 +38,7 @@ SEARCH_ITERATIONS = 800
 """Most Newton iterations of a relaxation. A jump at a fold of vibro-impact takes 400 to 500; a block that does not
 settle ends after 600 to 740 by its steps."""
 
-RUNAWAY = 1.0 / SMALL
+RUNAWAY = 1e3
 """Displacement over the largest one of vibration and start; above it parts run away."""
 
 RELAXED_CHANGE = SMOOTH_CHANGE / 10.0
@@ -115,7 +115,7 @@ def relax_to_periodic(
     at = f"at {joint.omega / (2.0 * np.pi):.6g} Hz"
     budget.report(f"{at}, where the vibration is left to settle in time")
     transient = Transient(joint)
-    begun, history = Transient(start_joint).periodic(start.evaluation).displacement, start.history
+    begun, history = Transient(start_joint).periodic(start.evaluation).displacement, start.next_history
     # amplitudes of a periodic motion that are constant at the frequency of this joint
     motion = Motion(begun, transient.rates[:, None] * begun)
     predicted, period = start.evaluation.predicted_h, 2.0 * np.pi / joint.omega
@@ -141,7 +141,7 @@ def relax_to_periodic(
         if end is None or too_far or damped:
             length *= TRANSIENT_CUT
             continue
-        motion, predicted, history = ahead, end.evaluation.predicted_h, end.history
+        motion, predicted, history = ahead, end.evaluation.predicted_h, end.next_history
         moved = np.abs(end.evaluation.displacement_h)
         size = max(size, float(moved[:, :, 1:].max()))
         if moved[:, :, 0].max() > RUNAWAY * size:

@@ -31,7 +31,7 @@ from solver.structure.joint import Joint
 class Balance:
     """A periodic problem: a joint, the tangential history of its pairs, and the wear.
 
-    - history (n_contact, n_history): tangential history, m (`Element`). first (n_contact, 3, N): predicted force, N,
+    - history (n_contact, n_history): tangential history, m (`Element`). before_t (n_contact, 3, N): predicted force, N,
       with this history, from which that of the state has slowly come; None where it was always the same.
     - wear_depth (n_contact,): depth without the growth, m; constant through the period, Eq. (6). Default: 0.
     - wear_gain (n_contact,): growth of the depth per wearing work, m/J; 0 where W is given. wearing: this work.
@@ -42,7 +42,7 @@ class Balance:
     wear_depth: FloatArray = field(default_factory=lambda: np.zeros(1))
     wear_gain: FloatArray | float = 0.0
     wearing: WearingWork = ARCHARDS_WORK
-    first: FloatArray | None = None
+    before_t: FloatArray | None = None
 
     def predict(self, displacement_h: FloatArray, force_h: FloatArray) -> FloatArray:
         """Predicted force (n_rel, m), N, Eq. (10), of a motion, m, and a contact force, N, both (n_contact, 3, m)."""
@@ -57,7 +57,7 @@ class Balance:
         pairs = joint.to_pairs(predicted_h)
         given = ~joint.contact.has_normal
         pairs[given, 0, 0] = joint.contact.normal_load[given]
-        marched = joint.law.march(pairs, self.history, self.first)
+        marched = joint.law.march(pairs, self.history, self.before_t)
         worn = marched.slip_work, marched.force_h[:, 0, 0], self.wear_depth
         wear_depth = self.wear_depth + self.wearing.growth(self.wear_gain, *worn)
         displacement_h = joint.law.motion(pairs - marched.force_h)
@@ -69,16 +69,16 @@ class Balance:
             predicted_h=predicted_h,
             residual=joint.structure.apply(motion) + force - joint.structure.force_h,
             scale=_residual_scale(joint.structure.force_h, force),
-            history=joint.law.started_from(marched, self.history),
+            start_history=joint.law.started_from(marched, self.history),
             displacement_h=displacement_h,
             wear_depth=wear_depth,
         )
 
     def linearise(self, at: Evaluation) -> Linearisation:
         """Exact derivative of the residual, Eqs. (16)-(18), including wear and the periodicity of friction."""
-        if self.first is None and at.slid.any():
+        if self.before_t is None and at.slid.any():
             at = replace(at, slid=np.zeros_like(at.slid))
-        force_tangent, slip_work_tangent = self.joint.law.tangent(at, self.history, self.first)
+        force_tangent, slip_work_tangent = self.joint.law.tangent(at, self.history, self.before_t)
         tangents = slip_work_tangent, force_tangent[:, 0, :]
         growth_tangent = self.wearing.growth_tangent(self.wear_gain, worn_by(at), *tangents)
         return Linearisation(self.joint, at, force_tangent, growth_tangent)
@@ -90,14 +90,15 @@ class Evaluation(Marched):
     """Residual for a predicted force, with the contact forces and states of the pairs.
 
     - predicted_h, residual (n_rel, 2H+1): N. scale: of the residual in the static and in the other harmonics, N.
-    - history (n_contact, n_history): with which the period begins, m. displacement_h (n_contact, 3, 2H+1): motion, m.
+    - start_history (n_contact, n_history): with which the period begins, m.
+    - displacement_h (n_contact, 3, 2H+1): motion, m.
     - wear_depth (n_contact,): m; at the end of the step in an implicit step.
     """
 
     predicted_h: FloatArray
     residual: FloatArray
     scale: tuple[float, float]
-    history: FloatArray
+    start_history: FloatArray
     displacement_h: FloatArray
     wear_depth: FloatArray
 
@@ -160,16 +161,12 @@ class Linearisation:
         """All other relative displacements."""
         return np.delete(np.arange(self.joint.component_index.size), self.active_rows)
 
-    def motion(self, step: FloatArray) -> FloatArray:
-        """Change of the motion (n_contact, 3, m), m, with a step (n_rel, m), N."""
-        return self.joint.to_pairs(self._untransmitted(step)[1])
-
     def apply(self, step: FloatArray, *, roughly: bool = False) -> FloatArray:
         """Jacobian times a step (n_rel, m), N; roughly: to at least three digits."""
-        rest, motion = self._untransmitted(step)
+        rest, motion = self.rest_and_motion(step)
         return self.joint.structure.apply(motion, roughly=roughly) + step - rest
 
-    def _untransmitted(self, step: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def rest_and_motion(self, step: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Part of a step (n_rel, m), N, that the pairs do not transmit, and their motion (n_rel, m), m."""
         joint = self.joint
         blocks = self.force_tangent, joint.law.compliance, self.growth_tangent

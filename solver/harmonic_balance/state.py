@@ -23,12 +23,12 @@ from solver.structure.joint import Case, Hold, Joint
 class State:
     """A converged periodic state; the next one depends on it alone.
 
-    history (n_contact, n_history): tangential history for the next state, m. parameter: of the path; NaN if none.
+    next_history (n_contact, n_history): tangential history for the next state, m. parameter: of the path; NaN if none.
     omega, excitation_amplitude, resolution, hold: of its joint: rad/s, N, harmonics and samples, as in `Case`.
     """
 
     evaluation: Evaluation
-    history: FloatArray
+    next_history: FloatArray
     omega: float
     excitation_amplitude: float
     resolution: Resolution
@@ -60,7 +60,7 @@ class Failure(Ended):
 
 def balance_after(joint: Joint, state: State) -> Balance:
     """Balance of a joint whose forces have slowly come from those of a state."""
-    return Balance(joint, state.history, first=state.evaluation.predicted_t)
+    return Balance(joint, state.next_history, before_t=state.evaluation.predicted_t)
 
 
 def state_of(joint: Joint, at: Evaluation, parameter: float = math.nan) -> State:
@@ -94,7 +94,7 @@ def transfer(case: Case, state: State, joint: Joint, *, with_tail: bool = False)
     tangential, end = evaluation.displacement_h[:, 1:], np.array([-2.0 * np.pi / evaluation.force_t.shape[2]])
     begun = joint.law.begun_at(tangential[:, :, 0], (tangential @ synthesis(known, end))[:, :, 0])
     same = state.case(case).penalty.inertial == joint.penalty.inertial
-    balance = Balance(joint, np.where(same[:, None], evaluation.history, begun), evaluation.wear_depth)
+    balance = Balance(joint, np.where(same[:, None], evaluation.start_history, begun), evaluation.wear_depth)
     motion_h, force_h = (
         change_orders(joint.to_relative(part), known, orders)
         for part in (evaluation.displacement_h, evaluation.force_h)

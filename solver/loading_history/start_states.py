@@ -28,7 +28,7 @@ from solver.loading_history.path import LoadingPath, Path, Step, cell_of, edge_o
 from solver.loading_history.sweep import NODE_ITERATIONS, SWEEP_ITERATIONS, Sweep
 from solver.model import FloatArray, ReducedModel
 from solver.newton.run import Budget, Run, guarded
-from solver.outcome import Outcome, describe_inaccurate
+from solver.outcome import Outcome, is_known_to
 from solver.packing import Packed, pack, unpack
 from solver.results.history import StartState
 from solver.results.state_report import evaluated, periodic_state
@@ -223,7 +223,7 @@ class FrequencySweep:
             estimate, found, reference = UNKNOWN, replace(found, accurate=False), None
         elif reference is not None:
             estimate = estimate + found.difference(ResolvedState(found.case, reference))
-        known = estimate.response, estimate.wear_rate
+        error, worse = max((estimate.wear_rate, "wear rate"), (estimate.response, "response"))
         # folds of a ramp are load factors
         fold = (present.fold, *folds)[-1] / (2.0 * np.pi) if self.omega is None else math.nan
         return StartState(
@@ -231,9 +231,9 @@ class FrequencySweep:
             state=periodic_state(found.point),
             penalty_omega=found.case.penalty_omega,
             resolution=found.case.resolution,
-            response_error=known[0],
-            wear_rate_error=known[1],
-            message="" if found.accurate else describe_inaccurate(*known, self.settings.rtol),
+            response_error=estimate.response,
+            wear_rate_error=estimate.wear_rate,
+            message="" if found.accurate else f"the {worse} {is_known_to(error, self.settings.rtol)}",
             branch=present.branch + len(folds),
             fold_frequency=float(fold),
             unjudged="" if unstable is None else unstable.message,

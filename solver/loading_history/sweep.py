@@ -3,7 +3,7 @@
 Friction gives a joint a family of periodic states. The tangential displacements at which the pairs stick select one,
 and these depend on all vibration before. So a sweep has nodes of its own, whose distance depends only on the change of
 the vibration. A state between two nodes is solved from the node before and leaves the sweep unchanged. At other depths
-a sweep is made again over its nodes (`EarlierSweep`).
+a sweep is made again over its nodes (`given_nodes`).
 
 The error of a sweep comes from its steps: from node to node the predicted force goes along a straight line, and pairs
 slide as it says (`solver.contact.slow_slide`). A reference sweep has a node in the middle of every second step, and
@@ -13,28 +13,18 @@ fold and where each pair slips or opens within the period: such a state follows 
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import Any, Generic
 
-from solver.accuracy.refinement import VIBRATION_RECHECK
 from solver.accuracy.resolved_state import NOTHING, fewer
-from solver.continuation.first_state import solve_first_state
-from solver.continuation.natural import ATTEMPTS, FINE_STEP, LARGEST_STEP_RATIO, SMOOTH_CHANGE, Lengths, take_step
+from solver.continuation.natural import ATTEMPTS, FINE_STEP, LARGEST_STEP_RATIO, Lengths, take_step
 from solver.continuation.transient import SEARCH_ITERATIONS
-from solver.harmonic_balance.state import Failure, State, vibration_change
-from solver.loading_history.path import LoadingPath, Path, S, Step
+from solver.harmonic_balance.state import Failure
+from solver.loading_history.given_nodes import LAST_NODES, follow
+from solver.loading_history.path import Path, S, Step
 from solver.newton.run import Budget, Run
 from solver.outcome import SENSITIVE_ERROR, Outcome
-from solver.packing import in_rows, packable
-from solver.results.history import StartState
-from solver.results.state_report import evaluated, periodic_state
-from solver.settings import Resolution
-from solver.stability.floquet import find_instability
-from solver.structure.condensation import SingularStructureError
-
-LAST_NODES = 3
-"""Last nodes of a sweep: the next one is predicted on the parabola through them. With a straight line the nodes of the
-slider take 7 % more iterations. With two and four ring, damper and dovetail agree within 3e-3."""
+from solver.packing import in_rows
 
 AIMED_CHANGE = 0.75
 """Expected change of the vibration in the next step over the largest change. Few steps are refused. With 0.6 and 0.9
@@ -50,7 +40,7 @@ takes 1400 in a corner within 500 cycles."""
 
 ITERATIONS_PER_SAVE = 100
 """Newton iterations after which a sweep is saved at its next node: 1 s of 48 pairs, 17 s of 336. Half and twice:
-sliders and dovetail are equal to 5e-7."""
+sliders and dovetail are equal to 5e-7, a worn dovetail within its error."""
 
 STEPS_OF_REFERENCE = 2
 """Steps of a sweep in one step of its reference: the errors of both are of second order in the step, and their
@@ -60,9 +50,6 @@ HALVINGS_TO_SLIP = 3
 """Halvings of the step in which slip begins, to find where its reference begins. Dovetail, 16 pairs, 39 harmonics,
 212.341 to 212.355 Hz, where rates are 220 to 4 % off: with two, 64 to 1.4 % are told, with three and four 117 to
 1.8 %."""
-
-LARGEST_CHANGE = 2.0
-"""Largest change between two nodes of an earlier sweep, over the largest change of a step of a sweep."""
 
 _SAVED = ("nodes", "failure", "length", "rate", "checked", "error", "branch", "fold", "reference", "skipped")
 """Attributes of a `Sweep` with which it goes on from a node, beside the iterations so far."""
@@ -282,87 +269,3 @@ def _led(path: Path[S], states: tuple[S, ...], targets: Sequence[float], run: Ru
     found = follow(path.at(resolution), states, targets, run.fresh(), halvings=ATTEMPTS)
     moved = path.moved(found[-1], run) if found else None
     return () if moved is None else (moved,)
-
-
-def follow(
-    path: Path[S],
-    states: tuple[S, ...],
-    targets: Sequence[float],
-    run: Run,
-    rough: Run | None = None,
-    halvings: int = 0,
-    most: float = math.inf,
-) -> tuple[S, ...]:
-    """The last states of a path that goes on from some over some targets; none where one of these is not found.
-
-    rough: for the states before the last target; by default `run`. halvings: of a part whose end is not found, or whose
-    change, over that of a step of a sweep, is larger than `most`.
-    """
-    ahead = list(targets)
-    while states and ahead:
-        after = path.solve(states, ahead[0], run if len(ahead) == 1 else rough or run)
-        if after is not None and (math.isinf(most) or path.change(states[-1], after) <= most):
-            states = (*states, after)[-LAST_NODES:]
-            ahead.pop(0)
-        elif halvings == 0:
-            return ()
-        else:
-            halvings -= 1
-            ahead.insert(0, 0.5 * (states[-1].parameter + ahead[0]))
-    return states
-
-
-@packable
-@dataclass(frozen=True)
-class EarlierSweep:
-    """A sweep to be made again at other depths. With other nodes, the wear would jump from depth to depth by its error.
-
-    nodes: frequencies, rad/s, or load factors of its nodes, none if lost; of a passage the frequencies that count, Hz.
-    start, resolution: state at its end, and harmonics and samples of the last node; None for a passage.
-    """
-
-    nodes: tuple[float, ...]
-    start: StartState | None = None
-    resolution: Resolution | None = None
-
-    def again(self, path: LoadingPath, run: Run, stride: int, *, with_switching: bool) -> StartState | None:
-        """The state at the end, with the errors of the earlier one; None where the sweep has jumped over a fold, there
-        is no stable state, or a new sweep has to choose nodes, harmonics and errors: above a change `VIBRATION_RECHECK`
-        of the vibration, or `SMOOTH_CHANGE` where each pair slips or opens, so that the state follows from the depths,
-        and no node says on which branch it lies.
-
-        path: with harmonics and samples of the state. stride: nodes in a step. with_switching: as `find_instability`.
-        """
-        start = self.start
-        if start is None or start.state is None or start.branch > 0:
-            return None
-        target = start.state.omega if path.omega is None else 1.0
-        known, history = evaluated(path.case, start.state), start.state.start_history
-        before = replace(known, history=history, parameter=target)
-        try:
-            state, most = path.solve((before,), target, run) if path.forgets(before) else None, SMOOTH_CHANGE
-            if state is None or not path.forgets(state):
-                state, most = self._over_nodes(path, target, run.fresh(), stride), VIBRATION_RECHECK
-            if state is None or vibration_change(before.evaluation, state.evaluation) > most:
-                return None
-            if find_instability(path.case, state, run, with_switching):
-                return None
-        except SingularStructureError:
-            return None
-        return replace(start, state=periodic_state(state), reference=None, newton_iterations=run.budget.iterations)
-
-    def _over_nodes(self, path: LoadingPath, target: float, run: Run, stride: int) -> State | None:
-        """The state at a target of the path, over the nodes; None where it is not found."""
-        if not self.nodes or self.resolution is None:
-            return None
-        coarse, (first, *nodes) = path.at(self.resolution), self.nodes[::stride]
-        joint = coarse.joint_at(first)
-        begin = solve_first_state(coarse.case, joint.omega, joint.excitation_amplitude, run)
-        if not isinstance(begin, State):
-            return None
-        rough, most = run.with_tolerance(path.case.settings.rough_tolerance), LARGEST_CHANGE * stride
-        # past a corner at the resonance: without halvings, half of the sweeps up to 212.6 Hz of the dovetail begin anew
-        states = follow(coarse, (replace(begin, parameter=first),), [*nodes, target], run, rough, ATTEMPTS, most)
-        if not states:
-            return None
-        return states[-1] if coarse.case is path.case else path.moved(states[-1], run)

@@ -10,21 +10,27 @@ from solver.accuracy.refinement import DIFFERENCE_SAFETY
 from solver.clock import computing_time
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import Failure
+from solver.loading_history.given_nodes import EarlierSweep
 from solver.loading_history.path import LoadingPath
 from solver.loading_history.start_states import FrequencySweep
-from solver.loading_history.sweep import STEPS_OF_REFERENCE, EarlierSweep
+from solver.loading_history.sweep import STEPS_OF_REFERENCE
 from solver.missions.mission import Block, MissionRequest
 from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.newton.run import Budget, Run
 from solver.outcome import Outcome
 from solver.results.history import StartState, first_cut_off
 from solver.results.state_report import evaluated, periodic_state
-from solver.settings import Direction, Passage
+from solver.settings import Direction, Passage, Resolution
 from solver.structure.joint import Case, build_case
 from solver.wear.problem import WearProblem, reference_of
 from solver.wear.slow_time import Guide, Integrator
 from solver.wear.step import rate_slope
 from solver.wear.wearing_joint import WearingJoint, WearRequest, WearState
+
+Earlier = EarlierSweep | tuple[float, ...] | None
+"""What a block of the mission before leaves: its sweep, or the frequencies of a passage that count, Hz; None for one
+that continues.
+"""
 
 
 @dataclass(frozen=True)
@@ -37,7 +43,7 @@ class BlockResult:
     response_error, growth_error: estimated relative errors.
     inaccurate: largest relative error of a state above rtol, 0 where there is none, inf where stability is not known.
     held, cut_off: whether a joint that slides as a whole was held, or a pair at an edge of the contact carries load.
-    guide, sweep: what the reference solution takes over, and the next mission (None for a block that continues).
+    guide, sweep: what the reference solution takes over, and the next mission.
     last: the state at the end, which a block that continues solves again; `start_history` is that which it leaves.
     iterations: of Newton's method, start state included.
     sweep_rate: |df/dt| / (zeta f)^2 of a passage; 0 for steady vibration.
@@ -54,7 +60,7 @@ class BlockResult:
     cut_off: bool = False
     guide: Guide | None = None
     last: StartState | None = None
-    sweep: EarlierSweep | None = None
+    sweep: Earlier = None
     iterations: int = 0
     sweep_rate: float = 0.0
 
@@ -76,7 +82,7 @@ class BlockInput:
     depth: FloatArray
     deadline: float = math.inf
     before: StartState | None = None
-    earlier: EarlierSweep | None = None
+    earlier: Earlier = None
     guide: Guide | None = None
     with_slope: bool = False
     with_switching: bool = True
@@ -99,11 +105,13 @@ class BlockInput:
         counts, law = np.array([0.0, self.block.cycles or 0.0]), self.mission.law.begun_at(self.depth)
         return WearRequest(self.mission.wear_coefficient, None, counts, law=law, ends_at_last=True)
 
-    def sweeps(self, direction: Direction, amplitude: float) -> FrequencySweep:
-        """A sweep at the depth before the block. amplitude: N."""
+    def sweeps(
+        self, direction: Direction, amplitude: float, known: tuple[tuple[float, Resolution], ...] = ()
+    ) -> FrequencySweep:
+        """A sweep at the depth before the block. amplitude: N. known: as in `FrequencySweep`."""
         settings = replace(self.mission.settings, time_limit=self.deadline - computing_time())
-        sweeps = FrequencySweep(self.model, amplitude, direction, settings)
-        sweeps.with_switching = self.with_switching
+        asked = self.model, amplitude, direction, settings
+        sweeps = FrequencySweep(*asked, with_switching=self.with_switching, known=known)
         sweeps.set_deadline(self.deadline)
         return sweeps
 
@@ -141,7 +149,7 @@ def run_block(given: BlockInput) -> BlockResult | Failure:
         slope = np.asarray(scipy.linalg.expm(counts[-1] * rates) - np.eye(len(rates)))
     # the errors of the first steps of the blocks have one sign and add up over the missions
     by_steps = DIFFERENCE_SAFETY * float(values["local"][-1]) / volume if volume > 0.0 else 0.0
-    motion, force, history = state.at.displacement_h, state.at.force_h, state.point.history
+    motion, force, history = state.at.displacement_h, state.at.force_h, state.point.next_history
     return BlockResult(
         growth=depth[-1],
         response=values["response"],
@@ -174,14 +182,14 @@ def find_start(given: BlockInput) -> tuple[StartState, EarlierSweep | None]:
     run = Run(given.mission.settings.tolerance, Budget(deadline=given.deadline))
     if given.before is not None:
         return _continued(given, given.before, run), None
-    if earlier is not None and earlier.start is not None:
+    if isinstance(earlier, EarlierSweep):
         omega = 2.0 * np.pi * block.ends[0] if block.way == "ramp" else None
         path = LoadingPath(given.case_of(earlier.start), block.excitation_amplitude, omega)
         stride = 1 if given.guide is None else STEPS_OF_REFERENCE
         again = earlier.again(path, run, stride, with_switching=given.with_switching)
         if again is not None:
             return again, earlier
-    direction = given.mission.first if block.way == "continue" else block.way
+    direction = given.mission.first_sweep if block.way == "continue" else block.way
     sweeps = given.sweeps(direction, block.excitation_amplitude)
     _, start = next(sweeps.states(np.array([block.ends[0]])))
     present = sweeps.present

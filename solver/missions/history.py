@@ -10,8 +10,7 @@ import numpy as np
 
 from solver.continuation.natural import Lengths, take_step
 from solver.harmonic_balance.state import Failure
-from solver.loading_history.sweep import EarlierSweep
-from solver.missions.block_run import BlockInput, BlockResult, run_block
+from solver.missions.block_run import BlockInput, BlockResult, Earlier, run_block
 from solver.missions.mission import MissionHistory, MissionRequest
 from solver.missions.passage import LARGEST_SWEEP_RATE, run_passage
 from solver.missions.step import MissionStep, attempt_step, values_of
@@ -30,20 +29,30 @@ from solver.wear.slow_time import RTOL_RATIO, Course, Guide, Integrator, Node, S
 class MissionState:
     """A joint after some missions; the next step depends on it and the last nodes of the course.
 
-    sweeps, first: with which the blocks of the last and of the first mission began, none before.
+    sweeps, first_sweeps: with which the blocks of the last and of the first mission began, none before.
     end: vibration at the end of the last mission, for a first block that continues. length: missions of the next step.
     inaccurate, sweep_rate (n_block,): largest values of the blocks so far.
     held_from, cut_off_from: missions before the first step with such a block, inf if never.
     """
 
-    sweeps: tuple[EarlierSweep | None, ...] = ()
-    first: tuple[EarlierSweep | None, ...] = ()
+    sweeps: tuple[Earlier, ...] = ()
+    first_sweeps: tuple[Earlier, ...] = ()
     end: StartState | None = None
     length: float = 1.0
     inaccurate: FloatArray | float = 0.0
     sweep_rate: FloatArray | float = 0.0
     held_from: float = math.inf
     cut_off_from: float = math.inf
+
+
+@dataclass
+class _Here:
+    """Where a step begins, and what its attempts leave: the last sweep of each block, and the last failure."""
+
+    state: MissionState
+    course: Course
+    sweeps: list[Earlier]
+    failure: Failure | None = None
 
 
 class MissionProblem:
@@ -61,9 +70,6 @@ class MissionProblem:
         self.last = mission.missions[-1] if history is None else int(history.course.ends[-1])
         # as in a wear history, stability is tested at the start and the end
         self._tested = (1, self.last) if history is None else ()
-        # the sweep with which each block began last, and why a step was not found
-        self._sweeps: list[EarlierSweep | None] = []
-        self._failure = Failure(Outcome.MARCH_FAILED, "the error of a step over one mission is too large")
 
     def advance(self, state: MissionState | None, course: Course) -> tuple[MissionState, Course] | Failure | None:  # noqa: D102
         state = state or MissionState()
@@ -75,16 +81,16 @@ class MissionProblem:
         longest = min(self.last - done, self.mission.largest_step or self.last)
         # a step over more than one extrapolates from three nodes
         longest = min(longest, self.last if len(course.ends) > 2 else 1)
-        earlier = state.sweeps if done or self.history is None else self.history.state.first
-        self._sweeps = list(earlier) or [None] * len(self.mission.blocks)
-        taken = take_step(self, (state, course), min(state.length, longest), Lengths(2, shortest=1, rescue=1))
+        earlier = state.sweeps if done or self.history is None else self.history.state.first_sweeps
+        here = _Here(state, course, list(earlier) or [None] * len(self.mission.blocks))
+        taken = take_step(self, here, min(state.length, longest), Lengths(2, shortest=1, rescue=1))
         if isinstance(taken, Failure):
             return taken
         step, length = taken
         results, sweeps = step.results, tuple(each.sweep for each in step.results)
         after = MissionState(
             sweeps,
-            state.first or sweeps,
+            state.first_sweeps or sweeps,
             results[-1].last,
             length,
             np.maximum([each.inaccurate for each in results], state.inaccurate),
@@ -97,31 +103,32 @@ class MissionProblem:
             course = replace(course, nodes=(replace(step.node, count=0.0, depth=course.nodes[0].depth),))
         return after, course.after(step.node)
 
-    def attempt(self, here: tuple[MissionState, Course], length: float) -> MissionStep | None:
+    def attempt(self, here: _Here, length: float) -> MissionStep | None:
         """As in SteppedProblem. The last mission of the step is computed."""
-        nodes, rtol = here[1].nodes, self.mission.settings.rtol * (1.0 if self.history is None else RTOL_RATIO)
+        nodes, rtol = here.course.nodes, self.mission.settings.rtol * (1.0 if self.history is None else RTOL_RATIO)
         number = int(nodes[-1].count + length)
-        run_mission = partial(self._mission, here[0], number, number in self._tested)
+        run_mission = partial(self._mission, here, number, number in self._tested)
         step = attempt_step(nodes, int(length), self.mission.area, run_mission, SHARE_OF_CAUSE * rtol)
         if isinstance(step, MissionStep):
             return step
-        self._failure = step
+        here.failure = step
         return None
 
     def ratio(self, _: object, end: MissionStep, __: float) -> float:  # noqa: D102
         return end.ratio
 
-    def rescue(self, _: object, __: float) -> Failure:
+    def rescue(self, here: _Here, _: float) -> Failure:
         """As in SteppedProblem: a mission that fails by itself ends the history."""
-        return self._failure
+        too_large = "the error of a step over one mission is too large"
+        return here.failure or Failure(Outcome.MARCH_FAILED, too_large)
 
     def _unstable_behind(self, state: MissionState, course: Course) -> Failure | None:
         """Instability behind the mission with which a history has reached its target, None if stable."""
         done = int(course.ends[-1])
         if done in self._tested:
             return None
-        self._sweeps, depth = list(state.sweeps), course.depths[-1].reshape(-1, self.mission.area.size).sum(axis=0)
-        behind = self._mission(state, done + 1, True, depth, False)
+        depth = course.depths[-1].reshape(-1, self.mission.area.size).sum(axis=0)
+        behind = self._mission(_Here(state, course, list(state.sweeps)), done + 1, True, depth, False)
         if isinstance(behind, Failure):
             return behind
         if all(math.isfinite(each.inaccurate) for each in behind):
@@ -129,16 +136,16 @@ class MissionProblem:
         return Failure(Outcome.INACCURATE, f"whether the joint vibrates stably behind mission {done} is not known")
 
     def _mission(
-        self, state: MissionState, number: int, tested: bool, depth: FloatArray, with_slopes: bool
+        self, here: _Here, number: int, tested: bool, depth: FloatArray, with_slopes: bool
     ) -> tuple[BlockResult, ...] | Failure:
         """Compute the blocks of a mission. number: from 1 on. depth (n_contact,): before the mission, m."""
-        mission, before, budget = self.mission, state.end, self.run.budget
+        mission, before, budget = self.mission, here.state.end, self.run.budget
         guides: tuple[Guide | None, ...] = (None,) * len(mission.blocks)
         if self.history is not None:
             course = self.history.course
             guides = course.nodes[int(np.searchsorted(course.counts, number))].guides
         results: list[BlockResult] = []
-        for place, (block, guide, earlier) in enumerate(zip(mission.blocks, guides, self._sweeps, strict=True)):
+        for place, (block, guide, earlier) in enumerate(zip(mission.blocks, guides, here.sweeps, strict=True)):
             run = run_passage if isinstance(block.frequency, Passage) else run_block
             last = before if block.way == "continue" else None
             given = BlockInput(mission, block, depth, budget.deadline, last, earlier, guide, with_slopes, tested)
@@ -147,7 +154,7 @@ class MissionProblem:
                 where = f"in mission {number}, {mission.called(place)}"
                 return Failure(result.outcome, ": ".join(filter(None, (where, result.message))))
             results.append(result)
-            self._sweeps[place] = result.sweep
+            here.sweeps[place] = result.sweep
             budget.iterations += result.iterations
             depth, before = depth + result.growth, result.last
         return tuple(results)

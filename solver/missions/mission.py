@@ -56,7 +56,7 @@ class MissionRequest:
 
     - blocks: with the friction in their models.
     - missions (n_output,): ascending whole numbers of missions at which the history is reported, the first 0.
-    - first: how the first mission begins where its first block continues.
+    - first_sweep: how the first mission begins where its first block continues.
     """
 
     blocks: tuple[Block, ...]
@@ -65,7 +65,7 @@ class MissionRequest:
     settings: SolverSettings
     law: WearLaw = ARCHARD
     until: WearTarget | None = None
-    first: Direction = "up"
+    first_sweep: Direction = "up"
     largest_step: int | None = None
 
     @property

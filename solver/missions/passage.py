@@ -31,7 +31,6 @@ import numpy as np
 
 from solver.clock import computing_time
 from solver.harmonic_balance.state import Failure, first_response, largest_responses
-from solver.loading_history.sweep import EarlierSweep
 from solver.missions.block_run import BlockInput, BlockResult
 from solver.model import ComplexArray, FloatArray
 from solver.modes.modal_model import linear_mode
@@ -113,7 +112,7 @@ def run_passage(given: BlockInput) -> BlockResult | Failure:
         cut_off=_is_cut_off(given, ascending),
         guide=Guide(tuple((state.frequency, state.start.resolution) for state in ascending), math.nan),
         last=ends[-1].start,
-        sweep=EarlierSweep(swept.needed),
+        sweep=swept.needed,
         iterations=swept.iterations,
         sweep_rate=sweep_rate if volume > 0.0 else 0.0,
     )
@@ -166,7 +165,7 @@ def find_states(given: BlockInput) -> Swept | Failure:
     low, high = sorted((passage.start, passage.stop))
     least = np.linspace(low, high, FIRST_FREQUENCIES).tolist()
     # the mission before has found the frequencies that count: a second sweep is then seldom needed
-    wanted, iterations = list(given.earlier.nodes if given.earlier else least), 0
+    wanted, iterations = list(given.earlier if isinstance(given.earlier, tuple) else least), 0
     states: list[SweptState] = []
     while wanted:
         more = states_at(given, np.array(sorted(wanted)))
@@ -228,10 +227,9 @@ def interval_errors(states: Sequence[SweptState], area: FloatArray) -> FloatArra
 
 def states_at(given: BlockInput, frequencies: FloatArray) -> list[SweptState] | Failure:
     """States of the sweep through the range at given frequencies, ascending, Hz."""
-    states, sweeps = list[SweptState](), given.sweeps(given.passage.sweep, given.block.excitation_amplitude)
-    if given.guide is not None:
-        # errors of a reference solution are not used
-        sweeps.known = given.guide.resolutions
+    # errors of a reference solution are not used
+    known = () if given.guide is None else given.guide.resolutions
+    states, sweeps = list[SweptState](), given.sweeps(given.passage.sweep, given.block.excitation_amplitude, known)
     for index, start in sweeps.states(frequencies):
         if start.state is None:
             return Failure(start.outcome, start.message)

@@ -70,12 +70,12 @@ def linear_mode(
 
 @dataclass(frozen=True, eq=False)
 class ModalModel(ReducedModel):
-    """A model in which harmonic 1, `first`, has a spring on its modal coordinate. The excitation amplitude is Q."""
+    """A model in which harmonic 1, `of_first`, has a spring on its modal coordinate. The excitation amplitude is Q."""
 
-    first: LinearModel = field(kw_only=True)
+    of_first: LinearModel = field(kw_only=True)
 
     def harmonic_structure(self, harmonic: int) -> LinearModel:  # noqa: D102
-        return self.first if harmonic == 1 else super().harmonic_structure(harmonic)
+        return self.of_first if harmonic == 1 else super().harmonic_structure(harmonic)
 
 
 def modal_model(model: ReducedModel, mode: LinearMode, damping_rate: float) -> ModalModel:
@@ -92,4 +92,4 @@ def modal_model(model: ReducedModel, mode: LinearMode, damping_rate: float) -> M
         load_harmonic=force.astype(complex),
     )
     kept = {name: getattr(model, name) for name in ("contact", "response_names", "n_sectors", "nodal_diameter")}
-    return ModalModel(linear={k: damped(each) for k, each in model.linear.items()}, **kept, first=sprung)
+    return ModalModel(linear={k: damped(each) for k, each in model.linear.items()}, **kept, of_first=sprung)

@@ -17,14 +17,14 @@ import numpy as np
 from solver.accuracy.refinement import refine
 from solver.accuracy.resolved_state import NOTHING, Estimate, ResolvedState, shifted
 from solver.contact.coulomb import SEPARATED, STICK, friction_limit
-from solver.continuation.first_state import RELIEF, relieved_history, state_at_rest
+from solver.continuation.first_state import RELIEF, state_at_rest
 from solver.continuation.natural import FINE_STEP, LARGEST_STEP_RATIO, NEAR_ITERATIONS
 from solver.harmonic_balance.dlft import Balance, Linearisation
 from solver.harmonic_balance.state import Failure, State, state_of
 from solver.loading_history.path import Path
 from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.modes.modal_model import LinearMode, linear_mode, modal_model
-from solver.newton.run import MOST_ITERATIONS, Bordered, Run
+from solver.newton.run import MOST_ITERATIONS, Bordered, BorderedProblem, Run
 from solver.outcome import Outcome
 from solver.packing import packable
 from solver.results.state_report import first_motion
@@ -93,14 +93,14 @@ class NonlinearMode(Path[ModeState]):
         history: FloatArray,
         run: Run,
         most: int = MOST_ITERATIONS,
-        first: FloatArray | None = None,
+        before_t: FloatArray | None = None,
     ) -> ModeState | None:
         """The mode at an amplitude a, m sqrt(kg); None where Newton's method fails.
 
-        start: first predicted force (n_rel, 2H+1), N, and values (3,). history, first: as in `Balance`.
+        start: first predicted force (n_rel, 2H+1), N, and values (3,). history, before_t: as in `Balance`.
         most: iterations.
         """
-        found = run.solve_bordered(_AtAmplitude(self, amplitude, history, first), *start, most)
+        found = run.solve_bordered(_AtAmplitude(self, amplitude, history, before_t), *start, most)
         # zeta goes to infinity where friction stops a mass for good: with few harmonics there are further states; below
         # frequency 0 there is the mode once more, backwards
         if found is None or abs(found.values[1]) > 1.0 or found.values[0] <= 0.0:
@@ -117,7 +117,7 @@ class NonlinearMode(Path[ModeState]):
         Nodes, too, are solved to the tolerance of results: otherwise the dovetail comes to another branch.
         """
         here, run = states[-1], run.with_tolerance(self.case.settings.tolerance)
-        history, first = here.history, here.evaluation.predicted_t
+        history, before_t = here.next_history, here.evaluation.predicted_t
         last = here.evaluation.predicted_h
         growth = target / here.parameter
         grown = np.concatenate([last[:, :1], growth * last[:, 1:]], axis=1)
@@ -126,7 +126,7 @@ class NonlinearMode(Path[ModeState]):
             ratio = (target - here.parameter) / (here.parameter - states[-2].parameter)
             change = last - states[-2].evaluation.predicted_h
             starts.insert(0, (last + ratio * change, here.values + ratio * (here.values - states[-2].values)))
-        found = (self.find(target, start, history, run, NEAR_ITERATIONS, first) for start in starts)
+        found = (self.find(target, start, history, run, NEAR_ITERATIONS, before_t) for start in starts)
         return next((state for state in found if state is not None), None)
 
     def change(self, before: ModeState, after: ModeState) -> float:  # noqa: D102
@@ -163,9 +163,10 @@ class ResolvedMode(ResolvedState):
 
     mode: NonlinearMode
 
-    def solve_at(self, resolution: Resolution, run: Run, *, with_tail: bool = False) -> "ResolvedMode | None":  # noqa: ARG002, D102
+    def solve_at(self, resolution: Resolution, run: Run, *, with_tail: bool = False) -> "ResolvedMode | None":
+        """As in ResolvedState; a mode has no start with a tail, and the other one would fail again."""
         other = self.mode.at(resolution)
-        found = other.moved(cast("ModeState", self.point), run)
+        found = None if with_tail else other.moved(cast("ModeState", self.point), run)
         return None if found is None else _resolved(other, found)
 
     def steps_to(self, _: Resolution, run: Run) -> tuple[list[ResolvedState], bool]:
@@ -185,7 +186,7 @@ def _resolved(mode: NonlinearMode, state: ModeState) -> ResolvedMode:
 
 
 @dataclass(frozen=True)
-class _AtAmplitude:
+class _AtAmplitude(BorderedProblem):
     """As BorderedProblem: the equations at an amplitude over the amplitude. Values: frequency, damping ratio and drive.
     Extra: x_1 (n,), m.
     """
@@ -193,12 +194,12 @@ class _AtAmplitude:
     mode: NonlinearMode
     amplitude: float
     history: FloatArray
-    first: FloatArray | None
+    before_t: FloatArray | None
 
     def evaluate(self, predicted_h: FloatArray, values: FloatArray) -> Bordered:
-        balance = Balance(self.mode.joint_with(values), self.history, first=self.first)
+        balance = Balance(self.mode.joint_with(values), self.history, before_t=self.before_t)
         at = balance.evaluate(predicted_h)
-        shape = first_motion(balance.joint, at.displacement_h, float(values[2]))
+        shape = first_motion(balance.joint, balance.joint.to_relative(at.displacement_h), float(values[2]))
         real, imaginary, square = self._products(shape, shape)
         errors = np.array([real - values[2] / self.amplitude, imaginary, 0.5 * (square - 1.0)])
         return Bordered(balance, at, values, errors, extra=shape)
@@ -219,10 +220,7 @@ class _AtAmplitude:
         return slopes, np.stack(errors, axis=1)
 
     def by_step(self, here: Bordered, tangent: Linearisation, step: FloatArray) -> FloatArray:
-        return self._products(here.extra, first_motion(here.balance.joint, tangent.motion(step), 0.0))
-
-    def fraction(self, _: Bordered, __: FloatArray) -> float:
-        return 1.0
+        return self._products(here.extra, first_motion(here.balance.joint, tangent.rest_and_motion(step)[1], 0.0))
 
 
 # --- where a mode begins ---
@@ -254,7 +252,8 @@ class Rest:
         start = self.state.evaluation.predicted_h.copy()
         start[:, 1:] = joint.structure.force_h[:, 1:]
         values = np.array([linear.omega, linear.damping_ratio, amplitude])
-        histories = (relieved_history(joint, self.state, fraction) for fraction in (0.0, RELIEF))
+        rest, friction = self.state.next_history, self.state.evaluation.force_h[:, 1:, 0]
+        histories = (joint.law.relieved(rest, fraction * friction) for fraction in (0.0, RELIEF))
         found = (self.mode.find(amplitude, (start, values), history, run.fresh()) for history in histories)
         return next((node for node in found if node is not None), None)
 
@@ -269,7 +268,7 @@ class Rest:
             motion = from_complex(np.zeros(dofs.size), amplitudes).reshape(*dofs.shape, -1)
             start = self.state.evaluation.predicted_h + joint.to_relative(joint.law.force(motion))
             values = np.array([linear.omega, linear.damping_ratio, size])
-            if found := self.mode.find(size, (start, values), self.state.history, run.fresh()):
+            if found := self.mode.find(size, (start, values), self.state.next_history, run.fresh()):
                 return found
         return None
 

@@ -17,11 +17,10 @@ from solver.accuracy.refinement import DIFFERENCE_SAFETY
 from solver.accuracy.resolved_state import shifted
 from solver.clock import computing_time
 from solver.contact.coulomb import SEPARATED, SLIP
-from solver.harmonic_balance.dlft import Evaluation
 from solver.harmonic_balance.state import Failure, first_response
 from solver.loading_history.path import Step
 from solver.loading_history.sweep import Sweep
-from solver.model import BoolArray, ComplexArray, FloatArray, ReducedModel
+from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.modes.mode import TOP_BASE, ModeState, NonlinearMode, Rest, find_rest
 from solver.newton.run import Budget, Run, guarded
 from solver.outcome import Ended, Outcome, is_known_to
@@ -188,6 +187,8 @@ def _judged(mode: NonlinearMode, found: ModeState, sweep: Sweep[ModeState] | Non
     # the damping ratio is the sum of parts that may cancel: its error is judged against the part of friction
     by_friction = float(joint.law.friction_work(at).sum()) / (2.0 * np.pi * (found.omega * found.parameter) ** 2)
     damping = max(by_friction, abs(found.damping_ratio), ROUND_OFF)
+    # a pair that slips moves
+    moved, least = np.abs(np.diff(at.state_t, axis=2)).max(axis=1), ROUND_OFF * np.abs(at.state_t).max(axis=(1, 2))
     known = {"natural frequency": float(errors[0]) / found.omega, "damping ratio": float(errors[1]) / damping}
     said = [f"the {name} {is_known_to(error, settings.rtol)}" for name, error in known.items() if error > settings.rtol]
     return ModePoint(
@@ -199,7 +200,7 @@ def _judged(mode: NonlinearMode, found: ModeState, sweep: Sweep[ModeState] | Non
         damping_error=float(errors[1]),
         response=first_response(joint, at),
         shape=found.shape,
-        slip_fraction=_slips(at).mean(axis=1),
+        slip_fraction=((at.status_t == SLIP) & (moved > least[:, None])).mean(axis=1),
         open_fraction=(at.status_t == SEPARATED).mean(axis=1),
         harmonics_used=resolution.highest,
         samples_used=resolution.samples,
@@ -234,10 +235,3 @@ def _lost(sweep: Sweep[ModeState]) -> Failure:
     where = f"from there to {behind.state.parameter:.4g} m sqrt(kg)" if behind else f"at a {beyond} amplitude"
     said = f"the mode is followed {way} to the amplitude {at}; no state is found {where}: {ends}"
     return Failure(Outcome.BRANCH_LOST, said)
-
-
-def _slips(at: Evaluation) -> BoolArray:
-    """Samples (n_contact, N) in which a pair slips and moves."""
-    moved = np.abs(np.diff(at.state_t, axis=2)).max(axis=1)
-    least = ROUND_OFF * np.abs(at.state_t).max(axis=(1, 2))
-    return np.asarray((at.status_t == SLIP) & (moved > least[:, None]))

@@ -15,9 +15,9 @@ from solver.harmonic_balance.dlft import Linearisation
 from solver.model import ComplexArray, FloatArray, IntArray
 from solver.newton.krylov import build_correction, ritz_values, solve_gmres
 from solver.newton.period_preconditioner import PeriodFactor, build_period_factor
-from solver.settings import SMALL, Resolution, SolverSettings
+from solver.settings import Resolution, SolverSettings
 
-FORCING = SMALL
+FORCING = 1e-3
 """Relative residual of a Newton direction. With half and twice this value the dovetail is equal to 1e-6, the damper to
 5e-8."""
 

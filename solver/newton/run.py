@@ -125,8 +125,9 @@ class BorderedProblem(Protocol):
     def by_step(self, here: Bordered, tangent: Linearisation, step: FloatArray) -> FloatArray:
         """Change (k,) of the errors with a step (n_rel, m), N, of the predicted force."""
 
-    def fraction(self, here: Bordered, change: FloatArray) -> float:
-        """Fraction of a Newton step, with a change (k,) of the values, that is taken: 1 for all, NaN to give up."""
+    def fraction(self, _: Bordered, __: FloatArray, /) -> float:
+        """Fraction of a Newton step, with a change (k,) of the values, that is taken: NaN to give up."""
+        return 1.0
 
 
 def bordered_step(
@@ -260,13 +261,13 @@ class Run:
         """False where a state has an odd number of real Floquet multipliers beyond +1 (`solver.stability.floquet`) at
         its wear depth, as the vibration is fast and the wear is slow; with more samples, too (`SAMPLES_OF_SIGN`).
         """
-        if self.solver.determinant_sign(Balance(joint, at.history).linearise(at)) >= 0.0:
+        if self.solver.determinant_sign(Balance(joint, at.start_history).linearise(at)) >= 0.0:
             return True
         # the predicted force of masses on rigid ground depends on the length of a sample
         if joint.law.rate_dependent:
             return False
         finer = replace(joint, basis=build_basis(joint.basis.orders, SAMPLES_OF_SIGN * joint.basis.n_samples))
-        sampled = Balance(finer, at.history, at.wear_depth)
+        sampled = Balance(finer, at.start_history, at.wear_depth)
         tangent = sampled.linearise(sampled.evaluate(at.predicted_h))
         return bool(JacobianSolver().determinant_sign(tangent) >= 0.0)
 

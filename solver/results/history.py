@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from solver.accuracy.resolved_state import Estimate
+from solver.accuracy.resolved_state import UNKNOWN, Estimate
 from solver.model import ComplexArray, ContactInterface, FloatArray, IntArray
 from solver.outcome import SENSITIVE_ERROR, Ended, Outcome, in_digits, is_known_to, known_to
 from solver.packing import packable
@@ -49,7 +49,7 @@ class StartState(Ended):
     message: why there is no state, or what is above rtol; or how far a sweep came.
     unjudged: why it is not known whether the state is stable, else "".
     reference: state of the reference sweep, solved with the resolution of the state; None where there is none.
-    by_resolution: the errors by harmonics and samples alone; None where these are all.
+    by_resolution: the errors by harmonics and samples alone.
     """
 
     outcome: Outcome
@@ -65,7 +65,7 @@ class StartState(Ended):
     message: str = ""
     unjudged: str = ""
     reference: PeriodicState | None = None
-    by_resolution: Estimate | None = None
+    by_resolution: Estimate = UNKNOWN
 
 
 @dataclass(frozen=True, repr=False)

@@ -24,7 +24,7 @@ LOOP_PHASES = 128
 def periodic_state(state: State) -> PeriodicState:
     """The state as a result in physical units; its arrays lie in rows, as when read from a file."""
     at = state.evaluation
-    arrays = (at.displacement_h, at.force_h, at.history)
+    arrays = (at.displacement_h, at.force_h, at.start_history)
     return PeriodicState(state.omega, state.excitation_amplitude, *(np.array(each, order="C") for each in arrays))
 
 
@@ -81,7 +81,7 @@ def resonance_frequency(joint: Joint, evaluation: Evaluation) -> tuple[float, fl
     """
     linear = joint.model.harmonic_structure(1)
     force = joint.excitation_amplitude * linear.load_harmonic
-    moved = first_motion(joint, evaluation.displacement_h, joint.excitation_amplitude)
+    moved = first_motion(joint, joint.to_relative(evaluation.displacement_h), joint.excitation_amplitude)
     inertia, work = float(np.real(np.vdot(moved, linear.mass @ moved))), complex(np.vdot(moved, force))
     square = joint.omega**2 + work.real / inertia if inertia > 0.0 else -1.0
     return (float(np.sqrt(square)), 0.5 * abs(work) / (square * inertia)) if square > 0.0 else (float("nan"),) * 2
@@ -104,9 +104,9 @@ def largest_distance(state_t: FloatArray) -> FloatArray:
     return largest
 
 
-def first_motion(joint: Joint, displacement_h: FloatArray, excitation_amplitude: float) -> ComplexArray:
-    """First harmonic (n,), m, of all displacements, from the relative ones of the pairs."""
-    linear, first = joint.model.harmonic_structure(1), to_complex(joint.to_relative(displacement_h))[:, 0]
+def first_motion(joint: Joint, motion_h: FloatArray, excitation_amplitude: float) -> ComplexArray:
+    """First harmonic (n,), m, of all displacements, from the relative ones of the pairs (n_rel, m), m."""
+    linear, first = joint.model.harmonic_structure(1), to_complex(motion_h)[:, 0]
     force = excitation_amplitude * linear.load_harmonic
     return whole_motion(linear, 1j * joint.omega, joint.contact.relative, force, first)
 

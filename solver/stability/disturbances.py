@@ -28,7 +28,7 @@ from solver.contact.coulomb import SEPARATED, STICK
 from solver.contact.element import SampledLaw
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.model import BoolArray, ComplexArray, FloatArray, IntArray, LinearModel, ReducedModel
-from solver.settings import FEWEST_SAMPLES, SMALL
+from solver.settings import FEWEST_SAMPLES
 from solver.structure.fourier import build_basis, derivative
 from solver.structure.joint import Joint
 
@@ -46,9 +46,9 @@ equal."""
 
 # Real part over omega from which an exponent is infinite, that of a displacement without mass made finite by round-off:
 # in random scenes from 8e10 on, those of the joint -88 to 0.
-_INFINITE = 1.0 / SMALL
+_INFINITE = 1e3
 ROUNDING = float(np.finfo(np.float64).eps)
-_HALF = 0.5 - SMALL  # imaginary part over omega from which a multiplier counts as real and negative
+_HALF = 0.499  # imaginary part over omega from which a multiplier counts as real and negative
 
 
 class Monodromy(NamedTuple):
@@ -116,7 +116,7 @@ def build_monodromy(joint: Joint, at: Evaluation, n_samples: int, n_sectors: int
     """
     steps = -(-n_samples // n_sectors)
     fine = replace(joint, basis=build_basis(joint.basis.orders, steps * n_sectors))
-    state = Balance(fine, at.history, at.wear_depth).evaluate(at.predicted_h)
+    state = Balance(fine, at.start_history, at.wear_depth).evaluate(at.predicted_h)
     switching, stuck = switching_pairs(state)
     dofs, moves = joint.contact.dofs, moving(joint, stuck)
     mass, damping, stiffness = _of_sectors(joint.model, moves, n_sectors)
@@ -203,7 +203,7 @@ def hill_multipliers(joint: Joint, at: Evaluation) -> ComplexArray:
     if (2 * n + n_rel) * m > EXPENSIVE_UNKNOWNS:
         return np.empty(0, np.complex128)
     fine = replace(joint, basis=build_basis(joint.basis.orders, HILL_SAMPLES))
-    balance = Balance(fine, at.history, at.wear_depth)
+    balance = Balance(fine, at.start_history, at.wear_depth)
     tangent = balance.linearise(balance.evaluate(at.predicted_h))
     size = float(np.abs(linear.stiffness).max())
     # time in 1 / omega, forces over the largest stiffness

@@ -34,7 +34,7 @@ from solver.newton.krylov import ritz_values
 from solver.newton.linear_solver import MOST_PRODUCTS, SMALL_JOINT
 from solver.newton.run import Run
 from solver.outcome import Outcome
-from solver.settings import FEWEST_SAMPLES, ROUND_OFF, SMALL, Resolution, all_orders, samples_for
+from solver.settings import FEWEST_SAMPLES, ROUND_OFF, Resolution, all_orders, samples_for
 from solver.stability.disturbances import (
     HILL_SAMPLES,
     ROUNDING,
@@ -52,6 +52,10 @@ from solver.structure.joint import Case, Joint
 OPENING_HARMONICS = 19
 """Fewest harmonics for a small joint that opens and closes: with 9 the multiplier is 0.95 in place of 2.8.
 With 13 and 27 vibro-impact and a bouncing block are equal."""
+
+GROWTH = 1e-3
+"""Growth of a disturbance in a period, and residual of a multiplier, that count as none. Half and twice: slider,
+masses, blocks and impacts are equal, ring and damper within 2e-3."""
 
 OTHER_BRANCH = 0.05
 """Relative difference of the vibration above which two states belong to different branches. At a wall more than 9
@@ -87,7 +91,7 @@ class Multipliers:
         if odd:
             return "fold"
         growth = abs(self.values[0]) - 1.0 if self.values.size else np.inf
-        if growth <= SMALL:
+        if growth <= GROWTH:
             return "stable"
         if not self.values.size or growth <= 2.0 * self.error:
             return "unknown"
@@ -214,7 +218,7 @@ def _integrated(joint: Joint, at: Evaluation, rtol: float, growing_only: bool) -
             return Multipliers(values, np.inf)
         # growth is a matter of the modulus: of multipliers of equal modulus another one may come first
         largest = float(abs(values[0]))
-        sizes, grows = [*sizes[-2:], largest], largest > 1.0 + SMALL
+        sizes, grows = [*sizes[-2:], largest], largest > 1.0 + GROWTH
         error = float(np.ptp(sizes)) if len(sizes) > 1 else np.inf
         error = error if every or not grows else max(error, SCATTER)
         known = abs(largest - 1.0) > 2.0 * error or (error <= rtol and not grows)
@@ -251,12 +255,12 @@ def multipliers_of(monodromy: Monodromy, every: bool) -> ComplexArray:
         return pass_period(monodromy, vector[:, None])[:, 0]
 
     def settled(values: ComplexArray, residuals: FloatArray) -> bool:
-        return bool(m * residuals[np.argmax(np.abs(values))] < SMALL)
+        return bool(m * residuals[np.argmax(np.abs(values))] < GROWTH)
 
     # a fixed start: the result must not depend on earlier computations
     start = np.random.default_rng(0).normal(size=size)
     values, residuals = ritz_values(passed, start, m * MOST_PRODUCTS, settled)
-    known = m * residuals < SMALL
+    known = m * residuals < GROWTH
     return (values[known] if settled(values, residuals) else values[:0]) ** m
 
 

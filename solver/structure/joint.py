@@ -7,7 +7,8 @@ from functools import cached_property
 
 import numpy as np
 
-from solver.contact.law import ContactLaw, build_law
+from solver.contact.element import Element
+from solver.contact.law import build_law
 from solver.model import ContactInterface, FloatArray, IntArray, ReducedModel
 from solver.packing import packable
 from solver.settings import Resolution, SolverSettings, first_resolution
@@ -43,7 +44,7 @@ class Joint:
         return self.contact.component_index
 
     @cached_property
-    def law(self) -> ContactLaw:
+    def law(self) -> Element:
         """The contact law of the pairs."""
         return build_law(self.penalty, self.contact, self.basis, self.omega)
 
@@ -84,10 +85,6 @@ class Hold:
     direction: FloatArray
     stiffness: float
     position: float
-
-    def force(self, motion: FloatArray) -> float:
-        """Force of the spring, N, at mean relative displacements (n_rel,), m."""
-        return self.stiffness * (float(self.direction @ motion) - self.position)
 
 
 def held(structure: CondensedStructure, hold: Hold | None) -> CondensedStructure:

@@ -118,7 +118,7 @@ def unstable_at_end(wearing: WearingJoint, state: WearState) -> Failure | None:
     state, which the sweep has judged already, is not known.
     """
     unknown = Failure(Outcome.INACCURATE, wearing.start.unjudged) if wearing.start.unjudged else None
-    if state.cycle == 0.0 and wearing.follow is None and not vibrates_otherwise(state):
+    if state.cycle == 0.0 and wearing.request.follow is None and not vibrates_otherwise(state):
         return unknown
     joint = wearing.joint_of(state)
     # the determinant of a joint that is free to slide is zero, and its sign is round-off

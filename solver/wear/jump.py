@@ -22,7 +22,7 @@ from solver.settings import NEGLIGIBLE, ROUND_OFF
 from solver.stability.floquet import OTHER_BRANCH
 from solver.structure.joint import Hold, Joint
 from solver.structure.penalty import HOLD_FRACTION
-from solver.wear.wearing_joint import Steps, WearingJoint, WearState
+from solver.wear.wearing_joint import LastStep, WearingJoint, WearState
 
 
 def jump(wearing: WearingJoint, state: WearState, worn: FloatArray, cycle: float) -> WearState | Failure:
@@ -35,7 +35,7 @@ def jump(wearing: WearingJoint, state: WearState, worn: FloatArray, cycle: float
     wearing.run.budget.most_iterations = float("inf")
     if isinstance(reached, Failure):
         return reached
-    return wearing.with_rates(replace(reached, cycle=cycle, steps=Steps(length=state.steps.length)))
+    return wearing.with_rates(replace(reached, cycle=cycle, last=LastStep()))
 
 
 def _with_hold(wearing: WearingJoint, state: WearState, worn: FloatArray, *, drifts: bool = False) -> WearState | None:
@@ -44,7 +44,7 @@ def _with_hold(wearing: WearingJoint, state: WearState, worn: FloatArray, *, dri
     if hold is None:
         return None
     joint = replace(state.point, hold=hold).joint(wearing.case)
-    point = wearing.run.state(Balance(joint, state.point.history, worn), state.at.predicted_h)
+    point = wearing.run.state(Balance(joint, state.point.next_history, worn), state.at.predicted_h)
     if point is None or not wearing.run.is_stable(joint, point.evaluation):
         return None
     if creeps(joint, hold, point.evaluation) or vibration_change(state.at, point.evaluation) > OTHER_BRANCH:
@@ -93,4 +93,5 @@ def free_slide(joint: Joint, at: Evaluation, *, drifts: bool = False) -> Hold | 
 def creeps(joint: Joint, hold: Hold, at: Evaluation) -> bool:
     """Whether the force of a hold is so large that the joint would creep noticeably without it."""
     friction = float(joint.contact.friction @ at.force_h[:, 0, 0])
-    return abs(hold.force(joint.to_relative(at.displacement_h)[:, 0])) > HOLD_FRACTION * friction
+    moved = float(hold.direction @ joint.to_relative(at.displacement_h)[:, 0]) - hold.position
+    return abs(hold.stiffness * moved) > HOLD_FRACTION * friction

@@ -73,11 +73,11 @@ class WearProblem(WearingJoint):
         self, case: Case, start: StartState, request: WearRequest, guide: Guide | None = None, stable_end: bool = False
     ) -> None:
         super().__init__(case, start, request)
-        self.steps, self.guide, self.stable_end = request.steps, guide, stable_end
+        self.guide, self.stable_end = guide, stable_end
         self.name = f"{request.steps!r} {request.end!r} {request.until!r} {guide is None}"
         counts = np.zeros(0) if isinstance(request.cycles, ToTheEnd) else request.cycles
         self.course = Course(self.area, counts, request.until)
-        self.limit = math.inf if self.steps is None and not request.ends_at_last else request.end
+        self.limit = math.inf if request.steps is None and not request.ends_at_last else request.end
 
     def advance(self, state: WearState | None, course: Course) -> tuple[WearState, Course] | Failure | None:
         """As in SlowProblem: the next state is checked and stored."""
@@ -112,7 +112,7 @@ class WearProblem(WearingJoint):
         if not known or known[-1][1] != now:
             after = replace(after, guide=replace(after.guide, resolutions=(*known, (after.cycle, now))))
         # local: sum of the local errors of the steps so far, m3
-        values = report | {"local": after.steps.error + local}
+        values = report | {"local": after.last.error + local}
         return after, course.after(Node(after.cycle, after.depth, after.rate, values))
 
     def _is_complete(self, state: WearState, course: Course) -> bool:
@@ -140,7 +140,7 @@ class WearProblem(WearingJoint):
 
     def with_first_length(self, state: WearState) -> WearState:
         """The first state with its step limit, and the length of an adaptive step; at least two lead to the limit."""
-        length, limit = state.steps.length, math.inf
+        length, limit = state.next_length, math.inf
         if self.guide is not None:
             length = self.guide.first_length
         elif self.wears(state):
@@ -148,12 +148,12 @@ class WearProblem(WearingJoint):
             moved, fastest = np.abs(state.at.displacement_h[:, :, 1:]).max(), state.rate.max()
             # the step limit is no bound where almost nothing slips
             length = min(FIRST_STEP * limit, float(FIRST_DEPTH * moved / fastest), 0.5 * self.limit)
-        steps, record = replace(state.steps, length=length), replace(state.record, step_limit=limit)
-        return replace(state, steps=steps, record=record, guide=replace(state.guide, first_length=length))
+        record, guide = replace(state.record, step_limit=limit), replace(state.guide, first_length=length)
+        return replace(state, next_length=length, record=record, guide=guide)
 
     def step(self, state: WearState) -> WearState | Failure:
         """The state after one step, with the largest length of the next one; or why there is none."""
-        length, shortest, steps = state.steps.length, self._shortest(state), self.steps
+        length, shortest, steps = state.next_length, self._shortest(state), self.request.steps
         if steps is not None:
             length = steps.length
             if steps.depth is not None:
@@ -164,7 +164,7 @@ class WearProblem(WearingJoint):
                 left = length * (math.floor(state.cycle / length + ROUND_OFF) + 1.0) - state.cycle
                 length = left if left < (1.0 - ROUND_OFF) * length else length
             shortest = SHORTEST_STEP * length
-        length = length if state.steps.before is None else min(length, state.steps.length)
+        length = length if state.last.before is None else min(length, state.next_length)
         # no extra step for a remainder below the round-off of the count
         if state.cycle + length >= self.limit * (1.0 - 1e-12):
             length = self.limit - state.cycle
@@ -172,7 +172,7 @@ class WearProblem(WearingJoint):
         taken = take_step(self, state, length, Lengths(2, shortest=shortest, rescue=shortest))
         if isinstance(taken, Failure):
             return taken
-        end, follow = replace(taken[0], steps=replace(taken[0].steps, length=taken[1])), self.follow
+        end, follow = replace(taken[0], next_length=taken[1]), self.request.follow
         if end.cycle >= self.limit * (1.0 - 1e-12):
             # the sum may be less by its last digit, and a history is not read beyond its last step
             end = replace(end, cycle=self.limit)
@@ -190,12 +190,13 @@ class WearProblem(WearingJoint):
         tested after each Euler step, and where the vibration has changed since the last test; a followed resonance may
         be unstable at constant frequency. An adaptive step that is `too_long` becomes shorter.
         """
-        scheme = scheme or ("adaptive" if self.steps is None else self.steps.scheme)
+        steps = self.request.steps
+        scheme = scheme or ("adaptive" if steps is None else steps.scheme)
         end = attempt_step(self, state, length, scheme)
-        adapts = self.steps is None and self.guide is None
+        adapts = steps is None and self.guide is None
         if end is not None and adapts and too_long(self, state, end.depth, length) is not None:
             return None
-        if end is None or self.follow is not None or (scheme == "adaptive" and not vibrates_otherwise(end)):
+        if end is None or self.request.follow is not None or (scheme == "adaptive" and not vibrates_otherwise(end)):
             return end
         return end if self.run.is_stable(self.joint_of(end), end.at) else None
 
@@ -203,17 +204,17 @@ class WearProblem(WearingJoint):
         """As in SteppedProblem: an Euler step counts whatever its error, the shortest adaptive step where the vibration
         changes little: at a corner of the wear rate.
         """
-        if self.steps is not None:
+        if self.request.steps is not None:
             return 0.0
         before, after = (float(each.depth @ self.area) for each in (state, end))
         rtol = self.case.settings.rtol if self.guide is None else RTOL_RATIO * self.case.settings.rtol
-        ratio = end.steps.error / allowed_error(SMALL_SHARE * rtol, before, after, state.cycle, length)
+        ratio = end.last.error / allowed_error(SMALL_SHARE * rtol, before, after, state.cycle, length)
         smooth = length <= self._shortest(state) and vibration_change(state.at, end.at) < SMOOTH_CHANGE
         return min(ratio, 1.0) if smooth else ratio
 
     def rescue(self, state: WearState, length: float) -> WearState | Failure:
         """As in SteppedProblem. In this order: an Euler step, a longer one across corners (both adaptive), a jump."""
-        if self.steps is None:
+        if self.request.steps is None:
             end = self.attempt(state, length, "implicit") or self._step_across(state, length)
             if end is not None:
                 return end
@@ -222,7 +223,7 @@ class WearProblem(WearingJoint):
             return failure
         beyond = jump(self, state, worn, state.cycle + length)
         if isinstance(beyond, Failure):
-            return beyond if self.follow is None else self.lost(state)
+            return beyond if self.request.follow is None else self.lost(state)
         return self.at_followed(beyond)
 
     def _step_across(self, state: WearState, shortest: float) -> WearState | None:

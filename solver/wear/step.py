@@ -40,7 +40,7 @@ from solver.newton.krylov import SIGN_PRODUCTS, ritz_values
 from solver.outcome import Outcome, in_digits
 from solver.settings import Scheme
 from solver.structure.joint import Joint
-from solver.wear.wearing_joint import WearingJoint, WearState
+from solver.wear.wearing_joint import LastStep, WearingJoint, WearState
 
 LARGEST_MOVED_LOAD = 10.0
 """Largest change of the normal forces in a step, over these forces, both as norms. For smaller changes the error of the
@@ -52,12 +52,12 @@ def attempt_step(wearing: WearingJoint, state: WearState, length: float, scheme:
     depth, rate = state.depth, state.rate
     worn_before, implicit_cycles = (depth + length * rate, 0.0) if scheme == "explicit" else (depth, length)
     w, grown = 0.0, np.zeros_like(depth)
-    if scheme == "adaptive" and (before := state.steps.before) is not None:
-        w, grown = length / state.steps.last, depth - before.evaluation.wear_depth
+    if scheme == "adaptive" and (before := state.last.before) is not None:
+        w, grown = length / state.last.length, depth - before.evaluation.wear_depth
         worn_before = depth + w**2 / (1.0 + 2.0 * w) * grown
         implicit_cycles = (1.0 + w) / (1.0 + 2.0 * w) * length
     gain = wearing.gain(implicit_cycles)
-    start = wearing.joint_of(state), state.point.history, worn_before, gain, wearing.wearing_work
+    start = wearing.joint_of(state), state.point.next_history, worn_before, gain, wearing.wearing_work
     balance, predicted = first_guess(wearing, state, Balance(*start, state.at.predicted_t), length)
     end = wearing.solve(balance, predicted, state)
     if end is None or _surprise(state, end, predicted) > SMOOTH_CHANGE or _runs_away(state, end):
@@ -67,8 +67,8 @@ def attempt_step(wearing: WearingJoint, state: WearState, length: float, scheme:
         explicit_depth = depth + (1.0 + w) * length * rate - w**2 * grown
         own, other = (1.0 + w) ** 2 / (6.0 * w * (1.0 + 2.0 * w)), (1.0 + 1.0 / w) / 6.0
         error = own / (own + other) * (end.depth - explicit_depth)
-    steps = replace(state.steps, before=state.point, last=length, error=float(np.abs(error) @ wearing.area))
-    return replace(end, cycle=state.cycle + length, steps=steps)
+    last = LastStep(state.point, length, float(np.abs(error) @ wearing.area))
+    return replace(end, cycle=state.cycle + length, last=last)
 
 
 def _surprise(state: WearState, end: WearState, predicted: FloatArray) -> float:
@@ -95,12 +95,12 @@ def first_guess(wearing: WearingJoint, state: WearState, balance: Balance, lengt
     """The balance of a step with its first frequency, and the first predicted force (n_rel, 2H+1), N:
     extrapolated from the last step, or those of the state where this residual is lower.
     """
-    point, now, before = state.point, state.at.predicted_h, state.steps.before
+    point, now, before = state.point, state.at.predicted_h, state.last.before
     if before is None or before.resolution != point.resolution:
         return balance, now
-    further, there = length / state.steps.last, balance
+    further, there = length / state.last.length, balance
     ahead = now + further * (now - before.evaluation.predicted_h)
-    if wearing.follow is not None:
+    if wearing.request.follow is not None:
         moved = replace(point, omega=point.omega + further * (point.omega - before.omega))
         there = replace(balance, joint=moved.joint(wearing.case))
     end = there.evaluate(ahead)
@@ -128,8 +128,7 @@ def _rate_changes(wearing: WearingJoint, state: WearState, depths: FloatArray, *
     """Changes dg (k, n_contact), m per cycle, of the wear rates of a state with changes of the depths, m, as exact as a
     Newton direction. fixed_factors: whether the factors of a table keep their values.
     """
-    at, balance, gain = state.at, wearing.balance_of(state), wearing.gain(1.0)
-    joint = balance.joint
+    joint, at, gain = wearing.joint_of(state), state.at, wearing.gain(1.0)
     force_tangent, work_tangent = joint.law.tangent(at)
     by_work, by_force, by_depth = (gain * part for part in wearing.wearing_work.slopes(*worn_by(at)))
     growth = by_work[:, None] * work_tangent + by_force[:, None] * force_tangent[:, 0]
@@ -140,7 +139,7 @@ def _rate_changes(wearing: WearingJoint, state: WearState, depths: FloatArray, *
     if acting.any():
         rights = np.zeros((int(acting.sum()), *at.predicted_h.shape))
         rights[:, :, 0] = -closing[acting] @ joint.structure.static_stiffness
-        steps = wearing.run.steps(balance, at, rights)
+        steps = wearing.run.steps(Balance(joint, at.start_history, state.depth), at, rights)
         moved = np.array([joint.to_pairs(step).reshape(growth.shape) for step in steps])
         changes[acting] += (growth * moved).sum(axis=2)
     return changes

@@ -2,7 +2,7 @@
 
 A `StartState` of a sweep has a `PeriodicState`, which is evaluated (`WearingJoint.unworn_state`) and becomes a `State`,
 as Newton's method gives it. A `WearState` has a `State` at a cycle count, and all with which the history goes on:
-what was `Checked`, the last of the `Steps`, and the `Record` for the result.
+what was `Checked`, the `LastStep`, and the `Record` for the result.
 
 A followed frequency is an unknown with one more equation: a given phase lag of the vibration, or that of the largest
 amplitude (`solver.continuation.phase_lag`).
@@ -19,7 +19,7 @@ import numpy as np
 from solver.accuracy.resolved_state import NOTHING, UNKNOWN, Estimate, left_out
 from solver.contact.wear_law import ARCHARD, WearLaw, wearing_work
 from solver.continuation.natural import NEAR_ITERATIONS
-from solver.continuation.phase_lag import accepted_rise, rise_of_response, solve_at_lag, solve_at_peak
+from solver.continuation.phase_lag import PEAK_RISE, rise_of_response, solve_at_lag, solve_at_peak
 from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
 from solver.harmonic_balance.state import Failure, State, state_of, vibration_change
 from solver.model import FloatArray
@@ -104,15 +104,12 @@ class Checked:
 
 @packable
 @dataclass(frozen=True)
-class Steps:
-    """The last step: the state before it, None at the first state and after a jump, its length, cycles, and its local
-    error, m3; and the largest length of the next one.
-    """
+class LastStep:
+    """The state before a step, None at the first state and after a jump; length, cycles, and local error, m3."""
 
     before: State | None = None
-    last: float = math.nan
+    length: float = math.nan
     error: float = 0.0
-    length: float = 1.0
 
 
 @packable
@@ -142,7 +139,7 @@ class WearState:
     """A wearing joint at one cycle count; the next step depends on this state only.
 
     cycle: count. point: periodic state with its depth and tangential history. rate (n_contact,): of its wear, m per
-    cycle. guide: for the reference solution.
+    cycle. guide: for the reference solution. next_length: largest length of the next step, cycles.
     lag, half_width: of a followed frequency: phase lag, rad, and change of the frequency over that of the lag, rad/s.
     """
 
@@ -152,7 +149,8 @@ class WearState:
     checked: Checked
     record: Record
     guide: Guide
-    steps: Steps = Steps()
+    last: LastStep = LastStep()
+    next_length: float = 1.0
     lag: float = 0.5 * math.pi
     half_width: float = 0.0
 
@@ -178,11 +176,9 @@ class WearingJoint:
     """
 
     def __init__(self, case: Case, start: StartState, request: WearRequest) -> None:
-        assert start.state is not None
         if request.steps is None:
             case = replace(case, settings=case.settings.of_steps)
-        self.case, self.start, self.request, self.follow = case, start, request, request.follow
-        self.unworn, self.area = start.state, case.model.contact.area
+        self.case, self.start, self.request, self.area = case, start, request, case.model.contact.area
         self.shifts = request.until is not None and request.until.quantity == "frequency_shift"
         self.wearing_work = wearing_work(request.law, case.model.contact)
         self.run = Run(case.settings.tolerance)
@@ -191,10 +187,6 @@ class WearingJoint:
         """The joint of a state."""
         return state.point.joint(self.case)
 
-    def balance_of(self, state: WearState) -> Balance:
-        """The balance that a state solves at constant wear depth."""
-        return Balance(self.joint_of(state), state.at.history, state.depth)
-
     def gain(self, cycles: float) -> FloatArray:
         """Growth of the depth over wearing work (n_contact,), m/J, in h cycles: `h k_w / alpha`, Eqs. (7), (24)."""
         return cycles * self.request.wear_coefficient / self.area
@@ -202,11 +194,12 @@ class WearingJoint:
     def unworn_state(self, periodic: PeriodicState | None = None) -> WearState:
         """The state at the start, or another one with its harmonics and samples, evaluated and not solved again."""
         start, nothing = self.start, np.zeros(self.area.size + 1)
-        point = evaluated(self.case, periodic or self.unworn)
-        estimate = Estimate(start.response_error, start.wear_rate_error)
+        known = periodic or start.state
+        assert known is not None
+        point = evaluated(self.case, known)
         # the stability of a start state has been checked
         judged_h, accurate = point.evaluation.predicted_h, start.outcome is Outcome.CONVERGED
-        checked = Checked(left_out(point), start.by_resolution or estimate, accurate, judged_h)
+        checked = Checked(left_out(point), start.by_resolution, accurate, judged_h)
         return self.with_rates(WearState(0.0, point, nothing, checked, Record(nothing), Guide((), 0.0)))
 
     @cached_property
@@ -216,8 +209,7 @@ class WearingJoint:
         """
         start, reference = self.start, self.start.reference
         if reference is None:
-            lost = start.by_resolution is not None and math.isinf(start.wear_rate_error)
-            return UNKNOWN if lost else NOTHING
+            return UNKNOWN if math.isinf(start.wear_rate_error) else NOTHING
         own, other = self.unworn_state(), self.unworn_state(reference)
         apart, whole = own.rate * self.area - other.rate * self.area, self.volume_rate(own)
         rate = float(in_whole(apart)) / whole if whole > 0.0 else 0.0
@@ -246,11 +238,11 @@ class WearingJoint:
         self, balance: Balance, start: FloatArray, state: WearState, most: int = NEAR_ITERATIONS
     ) -> WearState | None:
         """The state before with the solution of a balance from a first predicted force (n_rel, 2H+1), N, or None."""
-        if self.follow is None:
+        if self.request.follow is None:
             point = self.run.state(balance, start, most=most)
             return None if point is None else self.with_rates(replace(state, point=point))
         case, lag = state.point.case(self.case), state.lag
-        if self.follow.of == "peak":
+        if self.request.follow.of == "peak":
             peak = solve_at_peak(case, balance, start, lag, self.run, most)
             solved, lag = (None, lag) if peak is None else peak
         else:
@@ -259,20 +251,21 @@ class WearingJoint:
             return None
         turn = math.nan if solved.reduced is None else abs(float(solved.reduced[0, 0]))
         if math.isnan(turn) and state.half_width == 0.0:
-            turn = abs(rise_of_response(solved, self.run, accepted_rise(case.settings.rtol))[1])
+            turn = abs(rise_of_response(solved, self.run, PEAK_RISE * case.settings.rtol)[1])
         half_width = state.half_width if math.isnan(turn) else 1.0 / max(turn, 1e-300)
         point = state_of(solved.balance.joint, solved.at)
         return self.with_rates(replace(state, point=point, lag=lag, half_width=half_width))
 
     def at_followed(self, state: WearState) -> WearState | Failure:
         """The state at the frequency that is followed, with its depth and its tangential history."""
-        if self.follow is None:
+        if self.request.follow is None:
             return state
-        return self.solve(self.balance_of(state), state.at.predicted_h, state, MOST_ITERATIONS) or self.lost(state)
+        balance = Balance(self.joint_of(state), state.at.start_history, state.depth)
+        return self.solve(balance, state.at.predicted_h, state, MOST_ITERATIONS) or self.lost(state)
 
     def lost(self, state: WearState) -> Failure:
         """The end of a history whose frequency leaves its range, or beyond whose last state none is found."""
-        wanted, frequency = self.follow, state.point.omega / (2.0 * math.pi)
+        wanted, frequency = self.request.follow, state.point.omega / (2.0 * math.pi)
         assert wanted is not None
         reason = "ends: no state beyond is found to go on with"
         if not wanted.low <= frequency <= wanted.high:
@@ -284,9 +277,9 @@ class WearingJoint:
         """Error of a followed frequency, Hz; 0 for a given one. The phase lag is wrong by as much as the amplitude, and
         every amplitude that is less than the largest one by its error may be the largest one.
         """
-        if self.follow is None:
+        if self.request.follow is None:
             return 0.0
         lag = state.checked.estimate.response
-        if self.follow.of == "peak":
-            lag = math.sqrt(2.0 * lag) + accepted_rise(self.case.settings.rtol)
+        if self.request.follow.of == "peak":
+            lag = math.sqrt(2.0 * lag) + PEAK_RISE * self.case.settings.rtol
         return state.half_width * lag / (2.0 * math.pi)

@@ -9,17 +9,18 @@ from functools import lru_cache
 import numpy as np
 
 from solver import build_model
-from solver.model import FloatArray, ReducedModel
+from solver.harmonic_balance.dlft import Evaluation
+from solver.model import ReducedModel
 from solver.outcome import Outcome
-from solver.results.history import StartState
+from solver.results.history import StartState, WearHistory
+from solver.results.state_report import evaluated, periodic_motion
 from solver.settings import SolverSettings
-from solver.structure.fourier import synthesis, to_complex
 from solver.structure.joint import Joint
 from tests.cantilever import FRICTION, Cantilever
 from tests.contact_pair import ContactPair
 from tests.event_driven import Orbit
 from tests.random_scenes import log_uniform as _spread
-from tests.solver.models import branch_states, case_of, march_wear, sweep_of
+from tests.solver.models import branch_states, case_of, march_wear
 
 
 @dataclass(frozen=True)
@@ -36,64 +37,46 @@ class Scene(ContactPair):
         more = loads | {"gap": self.gap, "normal_load": self.normal_load, "response": self.massive}
         return build_model(self.mass, self.damping, self.stiffness, [dofs], 1.0, **more)
 
-    def orbit_next_to(self, joint: Joint, displacement_h: FloatArray) -> Orbit:
-        """The exact motion next to a state, given by its relative displacements. Raises NoPeriodicMotionError."""
-        orders, masses = joint.basis.orders, np.diag(self.mass) > 0.0
-        motion_h = np.zeros((masses.size, 2 * len(orders) + 1))
-        motion_h[masses] = joint.structure.response_h(joint.to_relative(displacement_h))
-        if self.tangent is not None and not masses[self.tangent]:
-            motion_h[self.tangent] = displacement_h[0, 1]
-        displacement = (motion_h @ synthesis(orders, np.zeros(1)))[:, 0]
-        velocity = (1j * self.omega * np.array(orders) * to_complex(motion_h)).sum(axis=1).real
-        return self.orbit_near(displacement, velocity)
+    def orbit_next_to(self, joint: Joint, at: Evaluation) -> Orbit:
+        """The exact motion next to a state. Raises NoPeriodicMotionError."""
+        motion = periodic_motion(joint, at)
+        return self.orbit_near(motion.displacement_t[:, 0], motion.velocity_t[:, 0])
 
 
 @dataclass(frozen=True)
 class Found:
-    """What the solver finds; NaN where it finds no state.
+    """What the solver finds, and the relative errors of complex first harmonics and slip work; NaN without a state."""
 
-    Relative errors of amplitudes, of complex first harmonics and of the slip work; what was estimated of the last two.
-    """
-
-    outcome: Outcome
-    amplitude: float = np.nan
+    history: WearHistory
     response: float = np.nan
     wear_rate: float = np.nan
-    response_estimate: float = np.nan
-    wear_rate_estimate: float = np.nan
-    highest: int = 0
-    samples: int = 0
-    iterations: int = 0
+
+    @property
+    def told(self) -> tuple[float, float]:
+        """The estimates of both errors."""
+        return float(self.history.response_error[0]), float(self.history.wear_rate_error[0])
 
     @property
     def safe(self) -> bool:
         """Whether each estimate is at least half of the error; what is exact has the estimate zero."""
-        response, wear_rate = 0.5 * self.response - 1e-10, 0.5 * self.wear_rate - 1e-10
-        return self.response_estimate >= response and self.wear_rate_estimate >= wear_rate
+        errors = zip(self.told, (self.response, self.wear_rate), strict=True)
+        return all(told >= 0.5 * true - 1e-10 for told, true in errors)
 
 
 def find(scene: Scene, settings: SolverSettings, sweep: str = "up") -> Found:
     """Solve, and compare with the exact motion next to what is found. Raises NoPeriodicMotionError."""
-    model, frequency = scene.model, np.array([scene.omega / (2.0 * np.pi)])
-    ((_, start),) = sweep_of(model, scene.friction, scene.excitation, sweep, settings).states(frequency)
+    asked = scene.model, scene.friction
+    (start,) = branch_states(*asked, scene.excitation, [scene.omega], settings, sweep)
     # the wear rate is the slip work
-    history = march_wear(model, scene.friction, start, 1.0, 1.0, "implicit", np.zeros(1), settings)
+    history = march_wear(*asked, start, 1.0, 1.0, "implicit", np.zeros(1), settings)
     if history.outcome is not Outcome.CONVERGED or start.state is None:
-        return Found(history.outcome, iterations=history.newton_iterations)
-    case = case_of(model, scene.friction, start.penalty_omega, settings, start.resolution)
-    orbit = scene.orbit_next_to(case.joint(scene.omega, scene.excitation), start.state.displacement_h)
-    exact, slip_work, found = scene.response(orbit), scene.slip_work(orbit), history.response[0]
-    return Found(
-        history.outcome,
-        amplitude=float(np.linalg.norm(np.abs(found) - np.abs(exact)) / np.linalg.norm(exact)),
-        response=float(np.linalg.norm(found - exact) / np.linalg.norm(exact)),
-        wear_rate=abs(float(history.wear_rate[0]) - slip_work) / (slip_work or 1.0),
-        response_estimate=float(history.response_error[0]),
-        wear_rate_estimate=float(history.wear_rate_error[0]),
-        highest=start.resolution.highest,
-        samples=start.resolution.samples,
-        iterations=history.newton_iterations,
-    )
+        return Found(history)
+    case = case_of(*asked, start.penalty_omega, settings, start.resolution)
+    state = evaluated(case, start.state)
+    orbit = scene.orbit_next_to(state.joint(case), state.evaluation)
+    exact, slip_work = scene.response(orbit), scene.slip_work(orbit)
+    apart = float(np.linalg.norm(history.response[0] - exact) / np.linalg.norm(exact))
+    return Found(history, apart, abs(float(history.wear_rate[0]) - slip_work) / (slip_work or 1.0))
 
 
 # --- random scenes ---
@@ -242,9 +225,6 @@ def drawn(kind: str, seed: int) -> Scene:
     return KINDS[kind](np.random.default_rng([seed, sorted(KINDS).index(kind)]))
 
 
-# --- textbook scenes ---
-
-
 def textbook_scenes() -> dict[str, tuple[Scene, str]]:
     """By name: the scene, and the sweep that leads to its state."""
     found = {}
@@ -261,8 +241,6 @@ def textbook_scenes() -> dict[str, tuple[Scene, str]]:
         found[f"vibro-impact {omega} {branch}"] = wall(omega, 5.0, 0.025, 100.0), sweep
     return found
 
-
-# --- a cantilever with rigid friction at its tip ---
 
 SPRINGS = {"rigid": np.inf, "soft spring": 20.0, "stiff spring": 200.0}  # N/m
 

@@ -1,7 +1,7 @@
 """Small models for the tests of the solver, all seeded, and the textbook and dovetail scenes at a small size."""
 
 from collections.abc import Sequence
-from dataclasses import fields, replace
+from dataclasses import fields, is_dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -16,6 +16,7 @@ from solver.loading_history.start_states import FrequencySweep
 from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel, needed_nodal_diameters, with_friction
 from solver.newton.run import Run
 from solver.results.history import StartState, WearHistory
+from solver.results.state_report import evaluated
 from solver.settings import Resolution, SolverSettings, first_resolution
 from solver.structure.joint import Case, Joint, build_case
 from solver.wear.history import integrate_together
@@ -34,12 +35,8 @@ def random_contact(random: np.random.Generator, kinds: Sequence[str], n_inner: i
     """Pairs whose displacements lie scattered among the inner ones."""
     n_contact = len(kinds)
     dofs = np.full((n_contact, 3), -1)
-    places = random.permutation(sum(len(COMPONENTS[kind]) for kind in kinds) + n_inner)
-    taken = 0
-    for pair, kind in enumerate(kinds):
-        for component in COMPONENTS[kind]:
-            dofs[pair, component] = places[taken]
-            taken += 1
+    places = [(pair, component) for pair, kind in enumerate(kinds) for component in COMPONENTS[kind]]
+    dofs[tuple(np.transpose(places))] = random.permutation(len(places) + n_inner)[: len(places)]
     return ContactInterface(
         dofs=dofs.astype(np.int64),
         area=random.uniform(0.5e-4, 2e-4, n_contact),
@@ -158,6 +155,14 @@ def branch_states(model, friction, amplitude, omegas, settings, sweep="up") -> l
     return [found[index] for index in range(len(omegas))]
 
 
+def state_at(model, friction, amplitude, omega, settings, sweep="up") -> tuple[StartState, Case, State]:
+    """A start state, which must exist, at an angular frequency, rad/s; its case, and the state evaluated."""
+    (start,) = branch_states(model, friction, amplitude, [omega], settings, sweep)
+    assert start.state is not None
+    case = case_of(model, friction, start.penalty_omega, settings, start.resolution)
+    return start, case, evaluated(case, start.state)
+
+
 def worn_state(kinds: Sequence[str], settings: SolverSettings) -> tuple[Joint, State]:
     """A random joint, worn a little, whose pairs stick, slip and open, and its state."""
     worn = np.random.default_rng(1).uniform(0.0, 2e-6, len(kinds))
@@ -182,14 +187,17 @@ def march_wear(
 
 def glued_frequency(model: ReducedModel) -> float:
     """First natural frequency of a model with its joint held, Hz, at the nodal diameter of the excitation."""
-    linear = model.linear[model.nodal_diameter]
+    linear = model.harmonic_structure(1)
     inner = np.setdiff1d(np.arange(len(linear.mass)), model.contact.dofs.ravel())
-    values = eigh(linear.stiffness[np.ix_(inner, inner)], linear.mass[np.ix_(inner, inner)], eigvals_only=True)
-    return float(np.sqrt(values[0]) / (2.0 * np.pi))
+    stiffness, mass = (part[np.ix_(inner, inner)] for part in (linear.stiffness, linear.mass))
+    return float(np.sqrt(eigh(stiffness, mass, eigvals_only=True)[0]) / (2.0 * np.pi))
 
 
 def assert_same(one: Any, other: Any) -> None:
     """Two results are equal to the last bit, but for the time that they took."""
-    for entry in fields(other):
-        if entry.name != "run_time":
-            np.testing.assert_array_equal(getattr(one, entry.name), getattr(other, entry.name), entry.name)
+    for name in (entry.name for entry in fields(other) if entry.name != "run_time"):
+        mine, its = getattr(one, name), getattr(other, name)
+        if is_dataclass(its):
+            assert_same(mine, its)
+        else:
+            np.testing.assert_array_equal(mine, its, name)

@@ -1,4 +1,4 @@
-"""What a periodic state must satisfy, from the full matrices of its model and the plain contact law.
+"""The structures and the contact law of the solver once more, slow and plain.
 
 Nothing here passes through the condensed structure, the kernels or the penalty of the solver. The law is written from
 Eqs. (11)-(15) in the convention of the project.
@@ -6,8 +6,7 @@ Eqs. (11)-(15) in the convention of the project.
 
 import numpy as np
 
-from solver.model import ComplexArray, FloatArray, LinearModel, ReducedModel
-from solver.results.history import PeriodicState
+from solver.model import FloatArray, LinearModel, ReducedModel
 
 
 def harmonic_structure(model: ReducedModel, harmonic: int) -> LinearModel:
@@ -18,54 +17,8 @@ def harmonic_structure(model: ReducedModel, harmonic: int) -> LinearModel:
     if 2 * wrapped <= model.n_sectors:
         return model.linear[wrapped]
     folded = model.linear[model.n_sectors - wrapped]
-    return LinearModel(
-        mass=folded.mass.conj(),
-        damping=folded.damping.conj(),
-        stiffness=folded.stiffness.conj(),
-        load_static=folded.load_static,
-        load_harmonic=folded.load_harmonic.conj(),
-        response=folded.response.conj(),
-    )
-
-
-def amplitudes(values_h: FloatArray, harmonic: int) -> ComplexArray:
-    """Complex amplitude X, `x(t) = Re(X exp(i n w t))`, of real coefficients; the mean for harmonic 0."""
-    if harmonic == 0:
-        return values_h[..., 0].astype(complex)
-    return values_h[..., 2 * harmonic - 1] - 1j * values_h[..., 2 * harmonic]
-
-
-def series(values_h: FloatArray, n_samples: int) -> FloatArray:
-    """Time samples of a Fourier series."""
-    phase = 2.0 * np.pi * np.arange(n_samples) / n_samples
-    total = np.repeat(values_h[..., :1], n_samples, axis=-1)
-    for harmonic in range(1, (values_h.shape[-1] + 1) // 2):
-        total = total + values_h[..., 2 * harmonic - 1, None] * np.cos(harmonic * phase)
-        total = total + values_h[..., 2 * harmonic, None] * np.sin(harmonic * phase)
-    return total
-
-
-def full_motion(model: ReducedModel, state: PeriodicState) -> list[ComplexArray]:
-    """Complex amplitudes (n_displacements,), m, of each harmonic of the whole structure, from a state.
-
-    The relative displacements are given: a static structure may be free to slide.
-    """
-    exists = model.contact.dofs >= 0
-    relative, moved = model.contact.dofs[exists], []
-    for n in range((state.displacement_h.shape[2] + 1) // 2):
-        linear = harmonic_structure(model, n)
-        matrix = linear.stiffness + 1j * n * state.omega * linear.damping - (n * state.omega) ** 2 * linear.mass
-        load = {0: linear.load_static, 1: state.excitation_amplitude * linear.load_harmonic}.get(n, 0.0 * matrix[0])
-        whole = np.zeros(len(matrix), complex)
-        whole[relative] = amplitudes(state.displacement_h, n)[exists]
-        inner = np.setdiff1d(np.arange(whole.size), relative)
-        if inner.size:
-            whole[inner] = np.linalg.solve(matrix[np.ix_(inner, inner)], (load - matrix @ whole)[inner])
-        moved.append(whole)
-    return moved
-
-
-# --- the contact law once more, slow and plain ---
+    turned = (each.conj() for each in (folded.mass, folded.damping, folded.stiffness))
+    return LinearModel(*turned, folded.load_static, folded.load_harmonic.conj(), folded.response.conj())
 
 
 def project(force: FloatArray, radius: float) -> FloatArray:

@@ -20,8 +20,6 @@ from studies import build_scene
 from tests.references import vibro_impact_orbit
 from tests.solver.models import assert_same, branch_states, case_of, march_wear
 
-# --- the branch with impacts ends, the mass falls on the other one ---
-
 OMEGA = 1.5
 FORCE = 0.02
 GAP = 0.1
@@ -50,8 +48,8 @@ def wall_start(sweep="up"):
 
 
 @lru_cache
-def wall_history(step, scheme, end=1000.0):
-    cycles = np.linspace(0.0, end, 21)
+def wall_history(step, scheme):
+    cycles = np.linspace(0.0, 1000.0, 21)
     return march_wear(worn_wall(), 1e-3, wall_start(), WALL_WEAR, step, scheme, cycles, IMPACT)
 
 
@@ -142,9 +140,6 @@ def test_a_root_that_begins_to_slide_all_over_wears_on():
     assert history.outcome in (Outcome.CONVERGED, Outcome.INACCURATE)
     # with a retainer of 1e6 N/m 8.7007, of 1e7 N/m 8.7015
     assert abs(1e9 * history.worn_volume[-1] - 8.701) < 1e-2 * 8.701
-
-
-# --- interrupted histories ---
 
 
 @pytest.mark.slow

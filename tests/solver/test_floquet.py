@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from solver import build_model, frequency_response
+from solver import frequency_response
 from solver import march_wear as worn_model
-from solver.continuation.first_state import solve_first_state, state_at_rest
+from solver.continuation.first_state import state_at_rest
 from solver.continuation.transient import relax_to_periodic
 from solver.harmonic_balance.dlft import Balance
 from solver.harmonic_balance.state import State
@@ -18,7 +18,6 @@ from solver.loading_history import start_states
 from solver.newton.linear_solver import JacobianSolver
 from solver.newton.run import Run
 from solver.outcome import Outcome
-from solver.results.state_report import evaluated
 from solver.settings import SolverSettings
 from solver.stability import floquet
 from solver.stability.disturbances import build_monodromy, switching_pairs
@@ -27,15 +26,10 @@ from solver.structure.fourier import from_complex, to_complex
 from solver.structure.penalty import Penalty
 from tests.rings import ring_of_sectors
 from tests.solver.exact_scenes import drawn
-from tests.solver.models import case_of, cyclic_model, first_point, march_wear, random_balance, random_model, sweep_of
+from tests.solver.models import case_of, cyclic_model, first_point, random_balance, random_model, state_at
 from tests.solver.models import scene as bundled
 
 SETTINGS = SolverSettings()
-
-
-def start_of(model, friction, excitation, frequency):
-    ((_, start),) = sweep_of(model, friction, excitation, "up", SETTINGS).states(np.array([frequency]))
-    return start
 
 
 def largest(multipliers):
@@ -61,11 +55,9 @@ def test_the_largest_multiplier_is_that_of_the_exact_motion(kind, seed, allowed,
     # unstable states are handed out, to be looked at here
     monkeypatch.setattr(start_states, "find_instability", lambda *_: None)
     scene = drawn(kind, seed)
-    start = start_of(scene.model, scene.friction, scene.excitation, scene.omega / (2.0 * np.pi))
-    case = case_of(scene.model, scene.friction, start.penalty_omega, SETTINGS, start.resolution)
-    state = evaluated(case, start.state)
+    _, case, state = state_at(scene.model, scene.friction, scene.excitation, scene.omega, SETTINGS)
     joint, at = state.joint(case), state.evaluation
-    exact = largest(scene.orbit_next_to(joint, at.displacement_h).multipliers())
+    exact = largest(scene.orbit_next_to(joint, at).multipliers())
     assert largest(multipliers_of(build_monodromy(joint, at, 512), every=True)) == pytest.approx(exact, abs=allowed)
     assert (find_instability(case, state, Run(SETTINGS.tolerance)) is not None) == (exact > 1.0)
 
@@ -83,29 +75,27 @@ DRIVEN = np.array([[-0.5, -0.02], [-0.02, 0.02]])
 @pytest.mark.parametrize(
     ("name", "matrices", "asked"),
     [
-        ("two_masses", {"damping": DRIVEN}, (0.5, 20.0, 0.05)),
-        ("two_masses", {"stiffness": np.array([[-2.0, -1.0], [-1.0, 1.0]])}, (0.5, 20.0, 0.05)),
-        ("vibro_impact", {"damping": np.diag([0.0, -0.05])}, (0.0, 0.02, 1.2 / (2.0 * np.pi))),
-        ("sdof_slider", {"damping": np.diag([0.0, -5.0])}, (0.5, 10.0, 200.0)),
+        ("two_masses", {"damping": DRIVEN}, (0.05, 20.0, 0.5)),
+        ("two_masses", {"stiffness": np.array([[-2.0, -1.0], [-1.0, 1.0]])}, (0.05, 20.0, 0.5)),
+        ("vibro_impact", {"damping": np.diag([0.0, -0.05])}, (1.2 / (2.0 * np.pi), 0.02, 0.0)),
+        ("sdof_slider", {"damping": np.diag([0.0, -5.0])}, (200.0, 10.0, 0.5)),
     ],
     ids=["damping", "stiffness", "wall", "slider"],
 )
 def test_a_growing_vibration_is_no_result(name, matrices, asked):
-    model, (friction, excitation, frequency) = with_matrices(name, **matrices), asked
-    start = start_of(model, friction, excitation, frequency)
-    assert start.outcome is Outcome.UNSTABLE
-    assert start.state is None
-    history = march_wear(model, friction, start, 1e-9, 1.0, "implicit", np.zeros(1), SETTINGS)
-    assert (history.outcome, history.message) == (start.outcome, start.message)
-    assert np.isnan(history.response).all()
+    model = with_matrices(name, **matrices)
+    found, history = frequency_response(model, *asked), worn_model(model, *asked, 1e-9, 1.0)
+    assert (history.outcome,) == found.outcome == (Outcome.UNSTABLE,)
+    assert (history.message,) == found.message
+    assert np.isnan([*found.response, *history.response]).all()
 
 
 def test_a_state_that_sticks_all_over_is_that_of_its_structure():
-    start = start_of(with_matrices("two_masses", damping=DRIVEN), 50.0, 20.0, 0.05)
-    assert start.outcome is Outcome.UNSTABLE
+    found = frequency_response(with_matrices("two_masses", damping=DRIVEN), 0.05, 20.0, 50.0)
+    assert found.outcome == (Outcome.UNSTABLE,)
     # for 20 s
-    assert f"{np.exp(0.25 * 20.0):.3g}" in start.message
-    assert "linear structure alone" in start.message
+    assert f"{np.exp(0.25 * 20.0):.3g}" in found.message[0]
+    assert "linear structure alone" in found.message[0]
 
 
 def test_the_largest_multiplier_by_products_is_that_of_all():
@@ -137,23 +127,13 @@ def test_disturbances_of_a_wave_are_those_of_its_ring(n_sectors, diameter, apart
     np.testing.assert_allclose(found, exact, rtol=1e-6)
 
 
-def two_masses_apart(damping, diameter):
-    """Two masses in each of 24 sectors that nothing couples; damping: to the ground, N s/m."""
-    mass, stiffness = np.diag([5.0, 0.05]), np.array([[2e5, -1e5], [-1e5, 1e5]])
-    drag = np.array([[damping + 5.0, -5.0], [-5.0, 5.0]])
-    more = {"load_harmonic": [1.0, 0.0], "normal_load": 50.0, "n_sectors": 24, "nodal_diameter": diameter}
-    parts = (dict.fromkeys(range(13), part) for part in (mass, drag, stiffness))
-    return build_model(*parts, [[-1, 1, -1]], 1e-4, **more)
-
-
-@pytest.mark.parametrize("damping", [-60.0, -150.0])
-def test_a_wave_of_uncoupled_sectors_is_as_stable_as_one_sector(damping):
-    one, wave = (
-        frequency_response(two_masses_apart(damping, diameter), [22.0], 200.0, 0.5, settings=SolverSettings(5, 64))
-        for diameter in (0, 3)
-    )
-    assert one.outcome == wave.outcome == (Outcome.UNSTABLE,)
-    assert one.message[0].split(" and ")[0] == wave.message[0].split(" and ")[0]
+@pytest.mark.parametrize("times", [0.8, 1.0])
+def test_a_wave_of_uncoupled_sectors_is_as_stable_as_one_sector(times):
+    alone = with_matrices("two_masses", damping=times * DRIVEN)
+    wave = replace(alone, linear=dict.fromkeys(range(13), alone.linear[0]), n_sectors=24, nodal_diameter=3)
+    one, other = (frequency_response(each, 0.05, 20.0, 0.5, settings=SolverSettings(5, 64)) for each in (alone, wave))
+    assert one.outcome == other.outcome == (Outcome.UNSTABLE,)
+    assert one.message[0].split(" and ")[0] == other.message[0].split(" and ")[0]
 
 
 def test_a_stability_that_is_not_known_is_said(monkeypatch):
@@ -175,8 +155,7 @@ def test_a_state_is_unstable_only_where_it_is_so_with_many_samples(monkeypatch):
     monkeypatch.setattr(JacobianSolver, "determinant_sign", sign)
     model, settings = bundled("vibro_impact"), SolverSettings(5, 64)
     case = case_of(model, 0.0, 1.2, settings)
-    first = solve_first_state(case, 1.2, 0.02, Run(settings.tolerance))
-    assert isinstance(first, State)
+    first_point(case, 1.2, 0.02)
     rest, joint = state_at_rest(case, 1.2, Run(settings.tolerance)), case.joint(1.2, 0.02)
     assert isinstance(relax_to_periodic(joint, np.zeros(1), rest, case.joint(1.2, 0.0), Run(settings.tolerance)), State)
 
@@ -184,9 +163,8 @@ def test_a_state_is_unstable_only_where_it_is_so_with_many_samples(monkeypatch):
 def test_multipliers_of_many_harmonics_have_samples_enough(monkeypatch):
     """A cylinder with 81 harmonics ended in an unexpected error: 128 samples."""
     monkeypatch.setattr(floquet, "SMALL_JOINT", 0)
-    case = case_of(bundled("vibro_impact"), 0.0, 1.2, SolverSettings(81, 512))
-    at = first_point(case, 1.2, 0.02).evaluation
-    found = floquet._integrated(case.joint(1.2, 0.02), at, 1e-2, True)
+    case, run = case_of(bundled("vibro_impact"), 0.0, 1.2, SolverSettings(81, 512)), Run(1e-8)
+    found = floquet.find_multipliers(case, first_point(case, 1.2, 0.02), run, growing_only=True)
     assert abs(found.values[0]) < 1.0
 
 

@@ -16,7 +16,7 @@ from solver.harmonic_balance.dlft import Balance
 from solver.newton.krylov import STAGNATION_PRODUCTS, build_correction, solve_gmres
 from solver.newton.linear_solver import DENSE_UNKNOWNS, JacobianSolver
 from solver.newton.period_preconditioner import build_period_factor, stiffness_of_most
-from solver.newton.run import Bordered, Run, bordered_step, solve_newton
+from solver.newton.run import Bordered, BorderedProblem, Run, bordered_step, solve_newton
 from solver.settings import Resolution, SolverSettings, all_orders
 from solver.structure.harmonic_stiffness import DenseStiffness
 from tests.solver.models import PRELOAD, case_of, random_balance, random_model
@@ -208,7 +208,7 @@ def test_the_march_is_the_inverse_where_nothing_is_cut_off_and_all_harmonics_see
 
 
 @dataclass(frozen=True)
-class Affine:
+class Affine(BorderedProblem):
     """A balance with two further unknowns q that push it, R(p) + B q = 0, and two linear equations of p and q."""
 
     balance: Balance
@@ -227,9 +227,6 @@ class Affine:
 
     def by_step(self, _, __, step):
         return np.tensordot(self.rows, step, 2)
-
-    def fraction(self, *_):
-        return 1.0
 
 
 @pytest.mark.parametrize("kinds", [("3d", "normal_only"), ("3d",) * 14])

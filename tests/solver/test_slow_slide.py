@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-import solver
 from solver.contact.slow_slide import INSIDE, PARTS, Path, slide_along, slide_tangent
+from solver.outcome import Outcome
 from solver.settings import SolverSettings
 from solver.structure.fourier import build_basis
-from tests.solver.models import branch_states, march_wear, random_balance, random_model, scene
-from tests.solver.test_balance import MODELS, jacobian_by_differences
+from tests.solver.models import branch_states, dovetail, march_wear, random_balance, random_model
+from tests.solver.test_elements import MODELS, jacobian_by_differences
 
 FRICTION, ORDERS = 0.5, tuple(range(1, 10))
 BASIS = build_basis(ORDERS, 128)
@@ -106,7 +106,7 @@ def test_jacobian_with_the_way_to_a_state_is_that_of_central_differences(wear):
         balance, predicted = random_balance(random_model(seed, MODELS["3d"]), SolverSettings(3, 24), seed, wear=wear)
         predicted[balance.joint.component_index % 3 == 0, 0] *= 3.0
         before = balance.evaluate(0.7 * predicted)
-        balance = replace(balance, history=before.history, first=before.predicted_t)
+        balance = replace(balance, history=before.start_history, before_t=before.predicted_t)
         at = balance.evaluate(predicted)
         if not (at.slid & (at.periods == 1)).any():
             continue
@@ -120,28 +120,13 @@ def test_jacobian_with_the_way_to_a_state_is_that_of_central_differences(wear):
     assert joined >= 2
 
 
-LONG = 212.42951760611248, 1.1941769464308571, 0.6184272339579265, 4.580559825081128e-12, [0.0, 275967.85]
-"""Frequency, Hz, force, N, friction coefficient, wear coefficient, 1/Pa, and cycles of a root that slides for long."""
-
-
-@pytest.mark.slow
-def test_a_root_that_slides_for_long_wears_as_in_short_steps():
-    """With one slide for each step the worn volume at 1e-2 was 3 % off."""
-    model, settings = scene("dovetail_sector", 21, mesh=1), [SolverSettings(9, 128, rtol=rtol) for rtol in (1e-2, 1e-3)]
-    loose, tight = (solver.march_wear(model, *LONG, sweep="ramp", settings=each) for each in settings)
-    assert loose.worn_volume[-1] == pytest.approx(tight.worn_volume[-1], rel=1e-3)
-
-
 @pytest.mark.slow
 def test_a_root_whose_position_nothing_determines_stays_in_its_slot():
     """Every pair slips in the first 1300 cycles: Newton's method came to 31 m."""
-    model, settings, (frequency, force, friction, wear, cycles) = (
-        scene("dovetail_sector", 39, mesh=1),
-        SolverSettings(rtol=0.1),
-        LONG,
-    )
-    (start,) = branch_states(model, friction, force, [2.0 * np.pi * frequency], settings, "ramp")
-    found = march_wear(model, friction, start, wear, 1.0, "adaptive", np.array(cycles), settings, loops=(0,))
-    assert found.outcome is solver.Outcome.CONVERGED
+    model, settings, mu = dovetail(39), SolverSettings(rtol=0.1), 0.6184272339579265
+    (start,) = branch_states(model, mu, 1.1941769464308571, [2.0 * np.pi * 212.42951760611248], settings, "ramp")
+    asked = 4.580559825081128e-12, 1.0, "adaptive", np.array([0.0, 275967.85]), settings
+    found = march_wear(model, mu, start, *asked, loops=(0,))
+    assert found.outcome is Outcome.CONVERGED
     assert np.abs(found.loop_displacement).max() < 1e-3
     assert found.worn_volume[-1] == pytest.approx(18.543e-9, rel=found.error_estimate)

@@ -19,7 +19,7 @@ from solver.wear import problem as control
 from solver.wear.check import choose_harmonics
 from solver.wear.step import moved_fraction, rate_slope
 from solver.wear.wearing_joint import Given, WearingJoint, WearRequest, WearState
-from tests.solver.models import branch_states, case_of, dovetail, march_wear, scene
+from tests.solver.models import branch_states, case_of, dovetail, march_wear, scene, state_at
 from tests.solver.worn_slider import AREA, problem
 
 
@@ -48,7 +48,7 @@ def test_a_given_step_follows_its_own_equation(scheme):
     assert np.diff(depth) == pytest.approx(4000.0 * taken, rel=1e-9)
     # the difference to the trapezoidal rule
     expected = 0.5 * 4000.0 * np.abs(np.diff(rate)) * AREA
-    assert [state.steps.error for state in states[1:]] == pytest.approx(expected, rel=1e-9)
+    assert [state.last.error for state in states[1:]] == pytest.approx(expected, rel=1e-9)
 
 
 def test_by_the_largest_depth_every_explicit_step_wears_this_depth():
@@ -63,7 +63,7 @@ def test_adaptive_steps_are_as_exact_as_asked_for_and_no_shorter():
     at, depth, _ = read(states)
     lengths = np.diff(at)
     worn = np.maximum(np.diff(depth), depth[1:] * lengths / at[1:]) * AREA
-    assert ([state.steps.error for state in states[1:]] <= control.SMALL_SHARE * rtol * worn).all()
+    assert ([state.last.error for state in states[1:]] <= control.SMALL_SHARE * rtol * worn).all()
     assert (lengths[1:] <= LARGEST_STEP_RATIO * lengths[:-1] * (1.0 + 1e-12)).all()
     assert states_of(None, 12, 1e-4)[-1].cycle < 0.5 * at[-1]
 
@@ -81,7 +81,7 @@ def failing(monkeypatch, fails):
 
 
 def test_a_step_that_is_not_found_is_shortened_and_in_the_end_an_euler_step(monkeypatch):
-    first = states_of(None, 0)[0].steps.length
+    first = states_of(None, 0)[0].next_length
     with monkeypatch.context() as patch:
         tried = failing(patch, lambda tried: len(tried) == 1)
         states = states_of(None, 1)
@@ -99,7 +99,7 @@ def test_a_longer_step_goes_across_corners_at_which_every_short_one_ends(monkeyp
     # so short a step changes less than the tolerance
     of.run = of.run.with_tolerance(1e-10)
     first = of.with_first_length(of.unworn_state())
-    shortest = control.FINE_STEP * first.steps.length
+    shortest = control.FINE_STEP * first.next_length
 
     def fails(tried):
         """All steps up to the shortest one, the Euler step, and some longer ones behind it."""
@@ -116,7 +116,7 @@ def test_a_longer_step_goes_across_corners_at_which_every_short_one_ends(monkeyp
         assert isinstance(found, WearState)
         assert tried[-2:] == [("adaptive", 2.0 * shortest), ("adaptive", 4.0 * shortest)]
         assert found.cycle == 2.0**doublings * shortest
-        assert found.steps.error > 0.0
+        assert found.last.error > 0.0
 
 
 def test_a_given_step_that_is_not_found_is_shortened_and_later_ones_end_at_multiples_again(monkeypatch):
@@ -144,8 +144,6 @@ def test_a_state_with_other_harmonics_has_the_wear_rate_of_its_own_motion():
     assert work.volume_rate(chosen) == pytest.approx(float(chosen.rate @ work.area))
     assert abs(chosen.rate / state.rate - 1.0).max() > 1e-4
 
-
-# --- limits ---
 
 COARSE_BLADE = SolverSettings(harmonics=3, samples=64)
 STIFFNESS, SLIDE, WEAR = 1e6, 1e-4, 1e-10  # N/m, of each pair towards the block; m, amplitude of the sliding; 1/Pa
@@ -176,7 +174,6 @@ def test_a_wear_coefficient_in_the_wrong_unit_is_a_step_too_long_and_the_step_th
     for scheme in ("explicit", "implicit"):
         refused = worn(scheme, 1000.0, 5000.0)
         assert refused.outcome is Outcome.STEP_TOO_LONG
-        assert "from cycle 0 on" in refused.message
     advised = float(refused.message.split("at most ")[1].split()[0])
     assert 1e-4 < advised < 1e-2
     assert worn("explicit", advised, 20.0 * advised).outcome is Outcome.CONVERGED
@@ -184,8 +181,7 @@ def test_a_wear_coefficient_in_the_wrong_unit_is_a_step_too_long_and_the_step_th
 
 def test_the_derivatives_of_the_wear_are_those_of_the_solved_states():
     model = scene("cylinder_on_flat", 3, strips=24)
-    (start,) = branch_states(model, 0.6, 1.0, [2.0 * np.pi * 20.0], COARSE_BLADE, "ramp")
-    case = case_of(model, 0.6, start.penalty_omega, COARSE_BLADE, start.resolution)
+    start, case, _ = state_at(model, 0.6, 1.0, 2.0 * np.pi * 20.0, COARSE_BLADE, "ramp")
     work = WearingJoint(case, start, WearRequest(1e-4, Given(1.0), np.array([0.0, 1.0])))
     state = work.unworn_state()
     work.run = Run(1e-13)
@@ -197,7 +193,7 @@ def test_the_derivatives_of_the_wear_are_those_of_the_solved_states():
         rates = []
         for sign in (1.0, -1.0):
             depth = at.wear_depth + sign * step * np.eye(slips.size)[pair]
-            solved = Run(1e-13).state(Balance(joint, at.history, depth), at.predicted_h)
+            solved = Run(1e-13).state(Balance(joint, at.start_history, depth), at.predicted_h)
             rates.append(gain * solved.evaluation.slip_work)
         wanted = (rates[0] - rates[1]) / (2.0 * step)
         # as exact as a Newton direction

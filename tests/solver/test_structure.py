@@ -25,9 +25,6 @@ KINDS = ("3d", "constant_load", "one_tangent", "second_tangent", "normal_only")
 AMPLITUDE = 60.0
 
 
-# --- Fourier basis ---
-
-
 def test_a_complex_amplitude_is_the_real_part_of_a_rotation_forwards():
     amplitudes = np.array([[0.7 - 0.2j, 1.5j], [-2.0, 0.1 + 0.4j]])
     static = np.array([0.5, -1.0])
@@ -113,11 +110,9 @@ def test_needed_nodal_diameters_are_folded():
 
 
 def test_matrices_that_all_harmonics_share_give_what_a_matrix_for_each_gives(monkeypatch):
-    model = scene("dovetail_sector", 5, mesh=1)
-    orders = (1, 2, 3, 5)
-    each = build_structure(model, OMEGA, AMPLITUDE, orders)
+    model, orders = scene("dovetail_sector", 5, mesh=1), (1, 2, 3, 5)
+    each = build_structure(scene("dovetail_sector", 5, mesh=1), OMEGA, AMPLITUDE, orders)
     monkeypatch.setattr(condensation, "DENSE_BYTES", 0.0)
-    condensation._condensed.cache_clear()
     shared = build_structure(model, OMEGA, AMPLITUDE, orders)
     assert isinstance(each.moving, DenseStiffness)
     assert isinstance(shared.moving, SharedStiffness)
@@ -138,9 +133,6 @@ def test_matrices_that_all_harmonics_share_give_what_a_matrix_for_each_gives(mon
     for structure in (shared, each):
         roughly = structure.apply(displacement_h, roughly=True)
         np.testing.assert_allclose(roughly, expected, rtol=0.0, atol=1e-6 * np.abs(expected).max())
-
-
-# --- penalty ---
 
 
 def test_an_elastic_joint_is_taken_at_displacement_level_near_its_stiffness():

@@ -10,34 +10,30 @@ from solver.results.history import StartState
 from solver.results.state_report import LOOP_PHASES
 from solver.settings import Scheme, SolverSettings, ToTheEnd, first_resolution
 from solver.wear import slow_time
-from solver.wear.problem import WearProblem
 from solver.wear.slow_time import CERTIFIED, Course, Integrator, Node
-from solver.wear.wearing_joint import WearRequest
-from tests.solver.models import branch_states, case_of, march_wear, random_model, scene
+from tests.solver.models import branch_states, march_wear, random_model, scene
 from tests.solver.worn_slider import (
     AREA,
     COARSE,
     CYCLES,
-    END,
     FRICTION,
     OMEGA,
     WEAR,
+    depths_of_motion,
     exact_depths,
-    exact_depths_of_motion,
     march,
+    problem,
 )
-
-# --- the slider ---
 
 STEPS = (8000.0, 4000.0, 2000.0, 1000.0)
 GIVEN: tuple[Scheme, ...] = ("explicit", "implicit")
 SCHEMES: tuple[Scheme, ...] = (*GIVEN, "adaptive")
 FEW = SolverSettings(harmonics=3, samples=128)
-FINE_OUTPUT = np.linspace(0.0, END, 101)
+FINE_OUTPUT = np.linspace(0.0, CYCLES[-1], 101)
 
 
 def final_depth(step, scheme):
-    history = march(step, scheme, np.array([0.0, END]))
+    history = march(step, scheme, np.array([0.0, CYCLES[-1]]))
     assert history.outcome is Outcome.CONVERGED
     return float(history.wear_depth[-1, 0])
 
@@ -110,24 +106,12 @@ def test_a_response_at_a_depth_is_that_of_less_normal_force():
     assert set(worn.outcome) == {Outcome.CONVERGED}
 
 
-# --- steps and their errors ---
-
-
-def steps_and_depth(rtol):
-    """Number of steps, and depth at the end, m, of an adaptive history without its reference solution."""
-    model, settings = scene("sdof_slider", 13), SolverSettings(13, 128, rtol=rtol)
-    (start,) = branch_states(model, FRICTION, 10.0, [OMEGA], settings)
-    case = case_of(model, FRICTION, start.penalty_omega, settings, start.resolution)
-    asked = WearRequest(WEAR, None, np.array([0.0, END]))
-    course = Integrator(np.inf).integrate(WearProblem(case, start, asked)).course
-    return len(course.ends), float(course.read(np.array([END]))["wear_depth"][0, 0])
-
-
 @pytest.mark.slow
 def test_the_slow_time_of_the_slider_is_of_second_order():
-    (few, coarse), (many, fine), (_, finest) = map(steps_and_depth, (1e-2, 1e-3, 1e-6))
-    order = np.log(abs(coarse - finest) / abs(fine - finest)) / np.log(many / few)
-    assert order > 1.7
+    courses = [Integrator(np.inf).integrate(problem(rtol=rtol)).course for rtol in (1e-2, 1e-3, 1e-6)]
+    few, many, _ = (len(course.ends) for course in courses)
+    coarse, fine, finest = (course.read(CYCLES[-1:])["wear_depth"][0, 0] for course in courses)
+    assert np.log(abs(coarse - finest) / abs(fine - finest)) / np.log(many / few) > 1.7
 
 
 @pytest.mark.parametrize(
@@ -137,7 +121,7 @@ def test_the_error_of_a_history_covers_and_does_not_alarm(wear, cycles, outputs,
     """Also for a count at the beginning of a long step, and where start state and steps have similar errors."""
     counts = np.linspace(0.0, cycles, outputs)
     history = march_model(scene("sdof_slider", 21), 160.0, 10.0, 0.5, wear, counts, settings=SolverSettings(rtol=rtol))
-    true = abs(float(history.wear_depth[-1, 0] / exact_depths_of_motion(np.array([0.0, cycles]), wear)[-1]) - 1.0)
+    true = abs(float(history.wear_depth[-1, 0] / depths_of_motion(np.array([0.0, cycles]), wear)[-1]) - 1.0)
     assert history.outcome is Outcome.CONVERGED
     assert true <= history.error_estimate <= 2.0 * rtol
 

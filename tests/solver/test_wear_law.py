@@ -10,7 +10,7 @@ from scipy.optimize import brentq
 from solver.contact.wear_law import ARCHARDS_WORK, PairFactors, WearingWork, WearLaw, WearTable, wearing_work
 from solver.settings import SolverSettings
 from tests.solver.models import random_balance, random_model
-from tests.solver.test_balance import jacobian_by_differences
+from tests.solver.test_elements import jacobian_by_differences
 from tests.solver.worn_slider import AREA, END, exact_depths, march
 
 # of the slider, whose pressure falls from 1e5 Pa to nothing while 1e-4 m wear off

@@ -152,7 +152,6 @@ def test_curves_and_balances_without_a_state_say_why():
     doubled = balance_of(model, 0.146, 0.02, 0.0, settings=SETTINGS)
     assert doubled.outcome is Outcome.PERIOD_DOUBLED
     assert np.isnan(doubled.state).all()
-    assert doubled.message
     assert np.isfinite(doubled.residual(np.zeros(doubled.size))).all()
 
 
@@ -161,9 +160,6 @@ def test_unknowns_that_cannot_be_are_refused():
     for wrong in (balance.state[:-1], np.full(balance.size, np.nan), balance.state.reshape(1, -1)):
         with pytest.raises(ValueError, match=r"^z: "):
             balance.residual(wrong)
-
-
-# --- travelling waves ---
 
 
 @pytest.mark.slow

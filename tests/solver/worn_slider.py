@@ -12,10 +12,11 @@ from solver.model import FloatArray, ReducedModel
 from solver.outcome import Outcome
 from solver.results.history import StartState, WearHistory
 from solver.settings import Scheme, SolverSettings
+from solver.structure.joint import Case
 from solver.wear.problem import WearProblem
 from solver.wear.wearing_joint import Given, WearRequest
 from tests.references import slider_amplitude, slider_wear_depth
-from tests.solver.models import branch_states, case_of, march_wear, scene
+from tests.solver.models import march_wear, scene, state_at
 
 OMEGA = 2 * np.pi * 160.0
 FRICTION = 0.5
@@ -28,29 +29,30 @@ CYCLES = np.linspace(0.0, END, 9)
 
 
 @lru_cache
-def slider_start() -> tuple[ReducedModel, StartState]:
+def slider_start() -> tuple[ReducedModel, StartState, Case]:
     model = scene("sdof_slider", COARSE.harmonics)
-    (start,) = branch_states(model, FRICTION, FORCE, [OMEGA], COARSE)
+    start, case, _ = state_at(model, FRICTION, FORCE, OMEGA, COARSE)
     assert start.outcome is Outcome.CONVERGED
-    return model, start
+    return model, start, case
 
 
 def march(
     step: float, scheme: Scheme, cycles: FloatArray = CYCLES, *, wear: float = WEAR, rtol: float = 1e-2, **asked: object
 ) -> WearHistory:
     """The history of the slider; asked: as of `models.march_wear`."""
-    model, start = slider_start()
+    model, start, _ = slider_start()
     return march_wear(model, FRICTION, start, wear, step, scheme, cycles, replace(COARSE, rtol=rtol), **asked)
 
 
 def problem(steps: Given | None = None, rtol: float = 1e-2) -> WearProblem:
     """The wearing slider up to the last cycle count."""
-    model, start = slider_start()
-    case = case_of(model, FRICTION, start.penalty_omega, replace(COARSE, rtol=rtol), start.resolution)
-    return WearProblem(case, start, WearRequest(WEAR, steps, np.array([0.0, END])))
+    _, start, case = slider_start()
+    return WearProblem(
+        replace(case, settings=replace(COARSE, rtol=rtol)), start, WearRequest(WEAR, steps, np.array([0.0, END]))
+    )
 
 
-def exact_depths_of_motion(cycles: FloatArray, wear: float = WEAR) -> FloatArray:
+def depths_of_motion(cycles: FloatArray, wear: float = WEAR) -> FloatArray:
     """Depths (n,), m, for the exact motion, by Den Hartog."""
     return slider_wear_depth(cycles, lambda limit: slider_amplitude(0.1, 0.0, 1.6e5, FORCE, limit, OMEGA), wear=wear)
 
