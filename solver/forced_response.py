@@ -11,7 +11,7 @@ from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.state import State, first_response, largest_responses
 from solver.loading_history.start_states import FrequencySweep
 from solver.model import ComplexArray, FloatArray, IntArray, ReducedModel
-from solver.outcome import Ended, Outcome, check
+from solver.outcome import Ended, Outcome, check, is_known_to
 from solver.presentation import Presented
 from solver.results.history import StartState, describe_cut_off, first_cut_off
 from solver.results.state_report import PeriodicMotion, evaluated, periodic_motion
@@ -154,6 +154,9 @@ def _read(
         outcome, message = Outcome.CONTACT_CUT_OFF, describe_cut_off(0.0)
     elif start.unjudged:
         outcome, message = Outcome.INACCURATE, "; ".join(filter(None, (message, start.unjudged)))
+    elif outcome is Outcome.CONVERGED and settings.automatic and start.response_error > settings.rtol:
+        # the harmonics suffice, but not the steps of the sweep
+        outcome, message = Outcome.INACCURATE, f"the response {is_known_to(start.response_error, settings.rtol)}"
     return first_response(joint, at), largest_responses(joint, at), outcome, message
 
 

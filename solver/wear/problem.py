@@ -19,11 +19,12 @@ has no final state: its wear rate becomes constant, and its steps double.
 
 import math
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from solver.accuracy.refinement import FEWEST_OF_SERIES
-from solver.accuracy.resolved_state import fewer, shifted, with_highest
+from solver.accuracy.resolved_state import Estimate, fewer, shifted, with_highest
 from solver.continuation.natural import FINE_STEP, NEAR_ITERATIONS, SMOOTH_CHANGE, Lengths, take_step
 from solver.harmonic_balance.state import Failure, vibration_change
 from solver.loading_history.sweep import NODE_ITERATIONS
@@ -107,13 +108,21 @@ class WearProblem(WearingJoint):
             report["response_error"] += self.by_sweep.response
             report["wear_rate_error"] += self.by_sweep.wear_rate
         if state is None:
-            after = self.with_first_length(after)
+            after = self.with_first_length(self._judged_alone(after, report) if self.request.end == 0.0 else after)
         known, now = after.guide.resolutions, after.point.resolution
         if not known or known[-1][1] != now:
             after = replace(after, guide=replace(after.guide, resolutions=(*known, (after.cycle, now))))
         # local: sum of the local errors of the steps so far, m3
         values = report | {"local": after.last.error + local}
         return after, course.after(Node(after.cycle, after.depth, after.rate, values))
+
+    def _judged_alone(self, state: WearState, report: dict[str, Any]) -> WearState:
+        """The state of a history of zero cycles, whose response is the result: judged by its error with the sweep."""
+        response, settings = report["response_error"], self.case.settings
+        if self.guide is not None or not settings.automatic or response <= settings.rtol:
+            return state
+        worst = Estimate(response, 0.0).larger(state.record.worst)
+        return replace(state, record=replace(state.record, inaccurate_from=0.0, worst=worst))
 
     def _is_complete(self, state: WearState, course: Course) -> bool:
         """Whether a history has come to its last count, its target, or its final state."""

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from solver import frequency_response
+from solver import frequency_response, march_wear
 from solver.accuracy.refinement import VIBRATION_RECHECK
 from solver.accuracy.resolved_state import left_out
 from solver.continuation.first_state import state_at_rest
@@ -23,6 +23,7 @@ from solver.packing import Packed
 from solver.settings import Resolution, SolverSettings, all_orders
 from solver.structure.condensation import condense
 from tests.benchmarks.frame import measure
+from tests.benchmarks.values import SCAR
 from tests.random_decks import random_deck, run_deck, static_forces
 from tests.random_scenes import random_scene
 from tests.solver import models
@@ -228,6 +229,16 @@ def test_a_free_block_needs_no_friction_where_it_is_pressed_on_and_is_pulled_off
     assert (exists, found, max(errors.values()) < 1e-7) == ("possible", Outcome.CONVERGED, True)
     pulled = replace(deck.model, linear={0: replace(linear, load_static=-linear.load_static)})
     assert run_deck(replace(deck, model=pulled))[:2] == ("impossible", Outcome.STATIC_OPEN)
+
+
+@pytest.mark.slow
+def test_a_response_that_its_sweep_leaves_above_rtol_is_inaccurate(monkeypatch):
+    monkeypatch.setattr(path_module, "CHANGE_LIMITS", (0.4, 0.4))
+    model, named = scene("dovetail_sector", mesh=1), {"wear_depth": SCAR, "settings": SolverSettings(rtol=5e-3)}
+    swept = frequency_response(model, [212.5], 0.5, 0.5, **named)
+    still = march_wear(model, 212.5, 0.5, 0.5, 1e-11, 0.0, **named)
+    assert (swept.outcome[0], still.outcome) == (Outcome.INACCURATE, Outcome.INACCURATE)
+    assert min(swept.response_error[0], still.response_error[0]) > 5e-3
 
 
 def test_a_mass_that_slides_all_the_time_needs_no_reference_sweep():
