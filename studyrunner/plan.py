@@ -54,16 +54,14 @@ class Effort(NamedTuple):
 
 
 def effort_of(works: Iterable[Work]) -> Effort:
-    """In one pass, the sweeps first."""
+    """What all of these take."""
     n_tasks, n_unknowns, seconds, longest = 0, 0, 0.0, 0.0
-    n_of, n_results, starts = Counter[str](), Counter[str](), dict[int, float]()
+    n_of, n_results = Counter[str](), Counter[str]()
     for work in works:
         n_tasks, n_unknowns, seconds = n_tasks + work.n_tasks, max(n_unknowns, work.n_unknowns), seconds + work.seconds
         n_of[work.way] += work.n_tasks
         n_results[work.way] += work.n_results
-        if work.way in ("sweep", "ramp"):
-            starts[len(starts)] = work.longest  # in the order of their numbers
-        longest = max(longest, work.longest + (0.0 if work.start is None else starts.get(work.start, 0.0)))
+        longest = max(longest, work.longest)
     by = " and ".join(count(n_of[way], way) for way in ("sweep", "ramp") if n_of[way])
     n_starts, modes = n_results["sweep"] + n_results["ramp"], count(n_of["mode"], "nonlinear mode")
     parts = {
@@ -83,7 +81,7 @@ def plan_lines(study: Study, say: Callable[[str], None]) -> list[str]:
     built_with = largest_memory() - before
     plan, largest = build_tasks(study, scenes, facts), merge_facts(facts)
     seconds = time.process_time() + seconds_left
-    effort = effort_of(itertools.chain((sweep.work for sweep in plan.sweeps), plan.works()))
+    effort = effort_of(itertools.chain((sweep.work for sweep in plan.sweeps), plan.works))
     rows = [
         *_of_study(study, facts, plan, effort),
         *_of_effort(study, largest, plan, effort, built_with, seconds),
