@@ -12,7 +12,7 @@ from studyrunner.kinds.estimate import AUTOMATIC_HARMONICS, COMPILE_SECONDS, lar
 from studyrunner.kinds.task import TaskPlan, Work, with_tasks
 from studyrunner.scene.answers import remarks_of_study
 from studyrunner.scene.scene import SceneFacts, values_of_point
-from studyrunner.scene.scene_set import SceneSet, contact_changes, merge_facts, plan_scenes
+from studyrunner.scene.scene_set import SceneSet, merge_facts, plan_scenes
 from studyrunner.study.sections import AUTO, SOLVER_AXES
 from studyrunner.study.study import MISSIONS, MODES, Study
 from studyrunner.system.progress import count, format_seconds
@@ -35,8 +35,7 @@ def build_tasks(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]) -> 
     """
     builders = {MISSIONS.name: missions.build_tasks, MODES.name: modes.build_tasks}
     build = builders.get(study.kind.name, wear_plan.build_tasks)
-    points = with_tasks(study, scenes, facts, contact_changes(study, scenes, facts))
-    return build(study, points, [each.n_displacements for each in facts])
+    return build(study, with_tasks(study, scenes, facts), [each.n_displacements for each in facts])
 
 
 class Effort(NamedTuple):

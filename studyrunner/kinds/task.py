@@ -21,7 +21,7 @@ from studyrunner.kinds.estimate import AUTOMATIC_HARMONICS
 from studyrunner.mpi.dispatch import CostKeys
 from studyrunner.points.table import Points
 from studyrunner.scene.scene import SceneFacts
-from studyrunner.scene.scene_set import ContactChange, SceneSet, frequencies
+from studyrunner.scene.scene_set import ContactChange, SceneSet, contact_changes, frequencies
 from studyrunner.study.sections import AUTO, SOLVER_AXES
 from studyrunner.study.study import Study
 from studyrunner.system.machine import MappedFile, package_digest
@@ -302,15 +302,13 @@ def number_points(tasks: Mapping[Any, Sequence[Sequence[int]]], n_points: int) -
 # --- from a study to its tasks ---
 
 
-def with_tasks(
-    study: Study, scenes: SceneSet, facts: Sequence[SceneFacts], contacts: Sequence[Sequence[ContactChange]]
-) -> Points:
+def with_tasks(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]) -> Points:
     """The points with what tasks are made of: "joint", a joint for each block, "law", "settings" and "hertz".
 
-    facts: of each scene. contacts: what differs in the pairs of each study, by block.
+    facts: of each scene. Raises UserError as `contact_changes` and `frequencies`.
     """
     points, limit = scenes.points, math.inf if study.solver.time_limit is None else study.solver.time_limit
-    parts = zip(points.studies, scenes.of_blocks, contacts, strict=True)
+    parts = zip(points.studies, scenes.of_blocks, contact_changes(study, scenes, facts), strict=True)
     joints = [
         tuple(map(joint_of, own.block_studies or (own,), numbers, of_blocks)) for own, numbers, of_blocks in parts
     ]
