@@ -12,7 +12,7 @@ from studyrunner.kinds.estimate import AUTOMATIC_HARMONICS, COMPILE_SECONDS, lar
 from studyrunner.kinds.task import TaskPlan, Work, with_tasks
 from studyrunner.scene.answers import remarks_of_study
 from studyrunner.scene.scene import SceneFacts, values_of_point
-from studyrunner.scene.scene_set import SceneSet, contact_changes, merge_facts, plan_scenes
+from studyrunner.scene.scene_set import SceneSet, merge_facts, plan_scenes
 from studyrunner.study.sections import AUTO, SOLVER_AXES
 from studyrunner.study.study import MISSIONS, MODES, Study
 from studyrunner.system.progress import count, format_seconds
@@ -35,8 +35,7 @@ def build_tasks(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]) -> 
     """
     builders = {MISSIONS.name: missions.build_tasks, MODES.name: modes.build_tasks}
     build = builders.get(study.kind.name, wear_plan.build_tasks)
-    points = with_tasks(study, scenes, facts, contact_changes(study, scenes, facts))
-    return build(study, points, [each.n_displacements for each in facts])
+    return build(study, with_tasks(study, scenes, facts), [each.n_displacements for each in facts])
 
 
 class Effort(NamedTuple):
@@ -54,16 +53,14 @@ class Effort(NamedTuple):
 
 
 def effort_of(works: Iterable[Work]) -> Effort:
-    """In one pass, the sweeps first."""
+    """What all of these take."""
     n_tasks, n_unknowns, seconds, longest = 0, 0, 0.0, 0.0
-    n_of, n_results, starts = Counter[str](), Counter[str](), dict[int, float]()
+    n_of, n_results = Counter[str](), Counter[str]()
     for work in works:
         n_tasks, n_unknowns, seconds = n_tasks + work.n_tasks, max(n_unknowns, work.n_unknowns), seconds + work.seconds
         n_of[work.way] += work.n_tasks
         n_results[work.way] += work.n_results
-        if work.way in ("sweep", "ramp"):
-            starts[len(starts)] = work.longest  # in the order of their numbers
-        longest = max(longest, work.longest + (0.0 if work.start is None else starts.get(work.start, 0.0)))
+        longest = max(longest, work.longest)
     by = " and ".join(count(n_of[way], way) for way in ("sweep", "ramp") if n_of[way])
     n_starts, modes = n_results["sweep"] + n_results["ramp"], count(n_of["mode"], "nonlinear mode")
     parts = {
@@ -83,7 +80,7 @@ def plan_lines(study: Study, say: Callable[[str], None]) -> list[str]:
     built_with = largest_memory() - before
     plan, largest = build_tasks(study, scenes, facts), merge_facts(facts)
     seconds = time.process_time() + seconds_left
-    effort = effort_of(itertools.chain((sweep.work for sweep in plan.sweeps), plan.works()))
+    effort = effort_of(itertools.chain((sweep.work for sweep in plan.sweeps), plan.works))
     rows = [
         *_of_study(study, facts, plan, effort),
         *_of_effort(study, largest, plan, effort, built_with, seconds),

@@ -21,7 +21,7 @@ from studyrunner.kinds.estimate import AUTOMATIC_HARMONICS
 from studyrunner.mpi.dispatch import CostKeys
 from studyrunner.points.table import Points
 from studyrunner.scene.scene import SceneFacts
-from studyrunner.scene.scene_set import ContactChange, SceneSet, frequencies
+from studyrunner.scene.scene_set import ContactChange, SceneSet, contact_changes, frequencies
 from studyrunner.study.sections import AUTO, SOLVER_AXES
 from studyrunner.study.study import Study
 from studyrunner.system.machine import MappedFile, package_digest
@@ -127,7 +127,7 @@ class Identity:
 class Work(NamedTuple):
     """What tasks take that are alike. way: what they do. n_results: that are computed, not read from others.
 
-    n_unknowns: most of one. seconds, longest: estimated time of all, and of one. start: the sweep that they wait for.
+    n_unknowns: most of one. seconds, longest: estimated time of all, and of one, in a plan with the sweep before it.
     """
 
     way: str
@@ -136,7 +136,6 @@ class Work(NamedTuple):
     n_unknowns: int
     seconds: float
     longest: float
-    start: int | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -218,8 +217,7 @@ class Task(ABC):
     @property
     def work(self) -> Work:
         """What it takes."""
-        start = None if self.waits_for is None else self.waits_for[0]
-        return Work(self.way, 1, self.n_results, self.n_unknowns, self.cost, self.cost, start)
+        return Work(self.way, 1, self.n_results, self.n_unknowns, self.cost, self.cost)
 
     def points(self, place: int) -> tuple[int, ...]:
         """Points that have the result at a place."""
@@ -256,13 +254,13 @@ def digest(*values: object) -> str:
 class TaskPlan:
     """All tasks of a study.
 
-    make: the tasks that give the results of points; histories wait for a start state. works: what they take, also of a
-    million of them. sweeps: the tasks that give start states. left_out: numbers of points that are not computed alone,
-    by reason. n_points: of the study.
+    make: the tasks that give the results of points; histories wait for a start state. works: what they take. sweeps:
+    the tasks that give start states. left_out: numbers of points that are not computed alone, by reason. n_points: of
+    the study.
     """
 
     make: Callable[[], Iterator[Task]]
-    works: Callable[[], Iterator[Work]]
+    works: Sequence[Work]
     left_out: Mapping[str, int]
     n_points: int
     sweeps: tuple[Task, ...] = ()
@@ -298,21 +296,19 @@ def number_points(tasks: Mapping[Any, Sequence[Sequence[int]]], n_points: int) -
     )
     shared = n_points - sum(len(task.order) for task in results)
     left_out = {EQUAL_POINTS: shared} if shared else {}
-    return TaskPlan(results.__iter__, lambda: (task.work for task in results), left_out, n_points)
+    return TaskPlan(results.__iter__, [task.work for task in results], left_out, n_points)
 
 
 # --- from a study to its tasks ---
 
 
-def with_tasks(
-    study: Study, scenes: SceneSet, facts: Sequence[SceneFacts], contacts: Sequence[Sequence[ContactChange]]
-) -> Points:
+def with_tasks(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]) -> Points:
     """The points with what tasks are made of: "joint", a joint for each block, "law", "settings" and "hertz".
 
-    facts: of each scene. contacts: what differs in the pairs of each study, by block.
+    facts: of each scene. Raises UserError as `contact_changes` and `frequencies`.
     """
     points, limit = scenes.points, math.inf if study.solver.time_limit is None else study.solver.time_limit
-    parts = zip(points.studies, scenes.of_blocks, contacts, strict=True)
+    parts = zip(points.studies, scenes.of_blocks, contact_changes(study, scenes, facts), strict=True)
     joints = [
         tuple(map(joint_of, own.block_studies or (own,), numbers, of_blocks)) for own, numbers, of_blocks in parts
     ]

@@ -100,20 +100,17 @@ def build_tasks(study: Study, points: Points, n_displacements: Sequence[int]) ->
     }
     sharing: _Sharing = lru_cache(_MOST_KNOWN)(partial(_share_histories, study))
     sweeps, groups = _find_starts(study, points, n_displacements)
-    causes = Counter[str]()
-    for group in groups():
-        causes.update(sharing(group.values)[1])
+    causes, n_tasks, n_integrated, n_unknowns, seconds, longest = Counter[str](), 0, 0, 0, 0.0, 0.0
+    for sweep, *_, values in groups():
+        tasks, shared = sharing(values)
+        causes.update(shared)
+        costs = [seconds_of(sweep.n_unknowns, each.iterations) for each in tasks]
+        n_tasks, n_integrated = n_tasks + len(tasks), n_integrated + sum(len(each.integrated) for each in tasks)
+        n_unknowns, seconds = max(n_unknowns, sweep.n_unknowns), seconds + sum(costs)
+        longest = max(longest, sweep.cost + max(costs))
     left_out = {reason: causes[cause] for cause, reason in _REASONS.items() if causes[cause]}
-
-    def works() -> Iterator[Work]:
-        for sweep, *_, values in groups():
-            tasks, n_unknowns = sharing(values)[0], sweep.n_unknowns
-            costs = [seconds_of(n_unknowns, each.iterations) for each in tasks]
-            n_integrated = sum(len(each.integrated) for each in tasks)
-            yield Work("history", len(tasks), n_integrated, n_unknowns, sum(costs), max(costs), sweep.number)
-
-    make = partial(_make_histories, groups, sharing, outputs)
-    return TaskPlan(make, works, left_out, points.n, tuple(sweeps))
+    work = Work("history", n_tasks, n_integrated, n_unknowns, seconds, longest)
+    return TaskPlan(partial(_make_histories, groups, sharing, outputs), [work], left_out, points.n, tuple(sweeps))
 
 
 def _find_starts(

@@ -110,22 +110,24 @@ def read_design(points: Any) -> Design:
 
 
 def _from_file(path: Path, source: str) -> Design:
+    columns: list[list[Any]] = []
     try:
         with path.open(encoding="utf-8-sig", newline="") as file:
             header = file.readline()
             delimiter = next((each for each in ";\t" if each in header), ",")
-            names = next(csv.reader([header.lstrip("# ")], delimiter=delimiter), [])
-            rows = list(csv.reader(file, delimiter=delimiter))
+            names, empty = next(csv.reader([header.lstrip("# ")], delimiter=delimiter), []), 0
+            columns += ([] for _ in names)
+            for number, row in enumerate(csv.reader(file, delimiter=delimiter), _FIRST):
+                # empty lines at the end are none
+                if row and (empty or len(row) != len(names)):
+                    remedy = f"give {count(len(names), 'value')}, one for each column"
+                    raise UserError(source, f"row {empty or number}", "" if empty else delimiter.join(row), remedy)
+                empty = empty or (0 if row else number)
+                for column, text in zip(columns, row, strict=False):
+                    column.append(_parse(text))
     except (OSError, UnicodeError, csv.Error) as error:
         reason = getattr(error, "strerror", None) or "it is no text in UTF-8 with a header and a row a point"
         raise UserError(source, "the file", None, f"give a CSV file that can be read: {reason}") from None
-    while rows and not rows[-1]:
-        rows.pop()
-    for number, row in enumerate(rows):
-        if len(row) != len(names):
-            remedy = f"give {count(len(names), 'value')}, one for each column"
-            raise UserError(source, f"row {number + _FIRST}", delimiter.join(row), remedy)
-    columns = [[_parse(row[place]) for row in rows] for place in range(len(names))]
     return make_design(source, names, columns, _FIRST)
 
 
