@@ -11,7 +11,7 @@ from studyrunner.result.arrays import coordinates, sample_coordinates
 from studyrunner.scene.scene_set import plan_scenes
 from studyrunner.study.study import Study
 
-HEADER = ("scene", "task", "seconds", "points_of_task", "sweep", "seconds_of_sweep")
+HEADER = ("scene", "task", "seconds", "points_of_task", "sweep_task", "seconds_of_sweep")
 """Columns after the values of a point. seconds: of the whole task, on one core, where every point wears."""
 
 
