@@ -174,6 +174,8 @@ def nearest_name(name: str, known: Iterable[str]) -> str:
 
 def close_name(name: str, known: Sequence[str]) -> str:
     """The known name that is meant by `name`; empty where none is."""
-    # a longer name for the same, or a shorter one
-    parts = [key for key in known if len(name) > 3 and (name.lower() in key or key in name.lower())]
-    return next(iter(difflib.get_close_matches(name, known, n=1) or parts), "")
+    own = name.lower()
+    # the end of a longer name, as "amplitude" of excitation_amplitude, or a part of it, or a shorter name
+    ends = [key for key in known if len(own) > 3 and key.endswith(f"_{own}")]
+    parts = [key for key in known if len(own) > 3 and (own in key or key in own)]
+    return next(iter(ends or difflib.get_close_matches(name, known, n=1) or parts), "")
