@@ -1,9 +1,12 @@
 """Mission histories: tasks and their computation."""
 
 import itertools
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import cast
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
 
 from solver.contact.wear_law import WearLaw
 from solver.missions.mission import Begin, Block, MissionRequest
@@ -12,9 +15,13 @@ from solver.packing import Packed
 from solver.settings import Direction, Passage, WearTarget
 from studyrunner.kinds import task as tasks
 from studyrunner.kinds.estimate import iterations_of_missions, missions_computed, seconds_of
-from studyrunner.kinds.results import mission_values
+from studyrunner.kinds.results import deepest, describe_target, first_harmonic, named
 from studyrunner.points.table import Points
 from studyrunner.study.study import Study
+from studyrunner.variables import OF_A_MISSION
+
+if TYPE_CHECKING:
+    from solver.missions.mission import MissionHistory
 
 _NO_JOINT = tasks.TaskJoint(0, None)
 
@@ -77,7 +84,7 @@ class Mission(tasks.Task):
         read = tuple(sorted({0, 1} | wanted | {max(number - 1, 0) for number in wanted}))
         first = cast("Direction", self.first)
         asked = MissionRequest(blocks, self.wear_coefficient, read, self.settings, self.law, self.until, first)
-        yield tasks.PointResult(mission_values(self, integrate_missions(asked, note, self.resume)))
+        yield tasks.PointResult(_values(self, integrate_missions(asked, note, self.resume)))
 
     def describe(self, place: int) -> str:  # noqa: ARG002
         """Its number."""
@@ -128,3 +135,48 @@ def _blocks(
         if given.passage is not None:
             frequency, begin = given.passage, given.passage.sweep
         yield PlannedBlock(given.name, joint, frequency, amplitude, cycles, cast("Begin", begin))
+
+
+def _values(task: Mission, history: "MissionHistory") -> dict[str, Any]:
+    """Variables of the result, at the numbers of missions that the task asks for."""
+    from solver.results.history import last_error
+
+    counts = np.array(task.missions)
+    rows, ends = (np.searchsorted(history.missions, each) for each in (counts, np.clip(counts, 1.0, None)))
+    in_mission = history.block_volume[ends] - history.block_volume[ends - 1]
+    rate, worn = in_mission.sum(axis=1), history.worn_volume[rows]
+    share = np.divide(in_mission, rate[:, None], out=np.full_like(in_mission, np.nan), where=rate[:, None] > 0.0)
+    reached = np.flatnonzero(np.isfinite(worn))
+    last = history.wear_depth[rows[reached[-1]] if reached.size else 0]
+    is_state = np.isfinite(history.worn_volume).any() and np.isfinite(history.response_begin).any()
+    of_depth = ("worn_volume", "worn_volume_error", "wear_depth", "wear_depth_error")
+    whole, target = history.last_mission >= task.missions[-1], ""
+    if history.outcome.complete:
+        target = describe_target(task.until, history.missions_to_target, "mission", whole=whole)
+    own: Mapping[str, object] = {
+        **{name: getattr(history, name)[rows] for name in (*of_depth, "response_error", "response_peak_begin")},
+        **deepest(history.wear_depth[rows], history.wear_depth_error[rows]),
+        **first_harmonic(history.response_end[rows]),
+        "wear_rate": np.where(np.isfinite(worn), rate, np.nan),
+        "wear_depth_last": last,
+        "block_worn_volume": history.block_volume[rows],
+        "block_worn_volume_error": history.block_volume_error[rows],
+        "block_share": share,
+        "response_amplitude_begin": np.abs(history.response_begin[rows]),
+        "response_peak": history.response_peak_end[rows],
+        "excitation_frequency": history.excitation_frequency[:, 1],
+        "excitation_frequency_begin": history.excitation_frequency[:, 0],
+        "block_cycles": np.array([block.cycles for block in task.blocks]),
+        "outcome": int(history.outcome),
+        # a mission is computed for the vibration at 0
+        "error_estimate": last_error(
+            counts[reached],
+            history.worn_volume_error[rows[reached]],
+            rate[reached],
+            min(history.last_mission, counts[-1]),
+        ),
+        "last_mission": min(history.last_mission, float(counts[-1])) if is_state else math.nan,
+        "largest_wear_depth": float(last.max(initial=0.0)) if reached.size else math.nan,
+        "message": "; ".join(filter(None, (history.message, target))),
+    }
+    return named((*task.variables, *OF_A_MISSION), own, history)

@@ -94,7 +94,7 @@ def _report(options: argparse.Namespace) -> int:
     from studyrunner.report.page import write_page
     from studyrunner.report.root import SERIES, find_writer
     from studyrunner.result.opening import reading_errors
-    from studyrunner.result.pairs import read_profile
+    from studyrunner.result.profile import read_profile
     from studyrunner.result.view import open_for_report
     from studyrunner.system.progress import count, format_seconds
 

@@ -6,7 +6,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -15,12 +15,10 @@ from numpy.typing import NDArray
 from solver.outcome import COMPLETE, SENSITIVE_ERROR, Outcome
 from studyrunner.coordinates import POINT
 from studyrunner.result.opening import ENDED, as_history, open_known, study_tables
+from studyrunner.result.profile import Profile
 from studyrunner.statistics.study_statistics import statistics_of_file
 from studyrunner.units import show_cycles, show_value
 from studyrunner.user_error import UserError
-
-if TYPE_CHECKING:
-    from studyrunner.result.pairs import Profile
 
 NO_VOLUME = 1e-24
 """Volume, m3, below which wear is round-off: a thousand atoms."""
@@ -50,7 +48,7 @@ class Result:
     fixed: tuple[str, ...] = ()
     blocks: xr.Dataset | None = None
     chosen: Mapping[str, float | str] = field(default_factory=dict)
-    measured: "Profile | None" = None
+    measured: Profile | None = None
     recomputed: Mapping[str, xr.Dataset] = field(default_factory=dict)
     no_worn_response: str = ""
 

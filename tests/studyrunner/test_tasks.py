@@ -13,7 +13,7 @@ from solver.packing import pack
 from solver.results.history import StartState
 from solver.settings import Resolution
 from studyrunner.cli import main
-from studyrunner.kinds.results import build_result
+from studyrunner.kinds.wear import build_result
 from studyrunner.plan import doubts_of_study, effort_of
 from studyrunner.study.study_file import bundled_studies, read_study
 from studyrunner.variables import ASKED, USUAL
