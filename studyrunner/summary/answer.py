@@ -1,6 +1,7 @@
-"""The summary of a result: for the command, the page and notebooks; as data, and in at most nine lines."""
+"""The summary of a result: for the command, the page and notebooks; as data, and in at most nine rows."""
 
 import math
+import textwrap
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,16 +16,22 @@ from studyrunner.result.pairs import contact_pairs
 from studyrunner.result.view import Result
 from studyrunner.summary.findings import LEAST_ERROR, Finding, what_came_out, where_is
 from studyrunner.system.progress import count
-from studyrunner.units import scale_for, show_percent, show_rtol
+from studyrunner.units import scale_for, show_number, show_percent, show_rtol
 from studyrunner.variables import OWN_STEPS
 
-MOST_LINES = 9
+MOST_ROWS, MOST_COLUMNS = 9, 100
 
 SMALL = 0.1
 """Largest depth over the width of the contact that is called small: slopes and stiffness change by that order."""
 
 _LARGEST = 100.0
 """Size, m, of a model without a mesh: masses on springs that are usual in textbooks move by some 10 m."""
+
+LARGEST_OF_METALS = 4e-13
+"""Largest measured wear coefficient of metals, 1/Pa: Ti-6Al-4V, 4e-4 mm3/J."""
+
+_FAST = 10.0
+"""Wear coefficient over the largest of metals from which it is pointed out."""
 
 _MOST_FAILURES = 2
 _WIDTH, _LONGEST = 12, 240
@@ -62,12 +69,14 @@ class Summary:
         """Label and text, in the order in which an engineer asks: the answer, failures, certainty."""
         rows = [(each.label, each.text) for each in self.findings]
         last = [row for row in rows[-1:] if row[0] == "certainty"]
-        return (*rows[: len(rows) - len(last)][: MOST_LINES - 1], *last)
+        return (*rows[: len(rows) - len(last)][: MOST_ROWS - 1], *last)
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """Lines of plain text: label and text of each row."""
-        return tuple(f"{label:<{_WIDTH}}{text}".translate(_PLAIN) for label, text in self.rows)
+        """Lines of plain text: label and text of each row, as wide as a terminal."""
+        look: dict[str, Any] = {"width": MOST_COLUMNS, "subsequent_indent": " " * _WIDTH, "break_on_hyphens": False}
+        rows = (f"{label:<{_WIDTH}}{text}".translate(_PLAIN) for label, text in self.rows)
+        return tuple(line for row in rows for line in textwrap.wrap(row, **look))
 
     def __str__(self) -> str:
         return "\n".join(self.lines)
@@ -88,6 +97,7 @@ def summarise(result: Result) -> Summary:
         doubts += [_not_small(result), _too_far(result), _in_radians(result, resonance), _too_few_counts(result)]
     wore = not any(each.name == "wear" and each.values.get("worn_volume") == 0.0 for each in findings)
     findings += [*(Finding("doubt", "beware", doubt) for doubt in doubts if doubt), *_failures(result)]
+    findings += _faster_than_metals(result)
     if certainty := certainty_of(result, wore=wore):
         findings.append(certainty)
     return Summary(result.computed.size, int(result.computed.sum()), tuple(findings))
@@ -172,6 +182,16 @@ def _in_radians(result: Result, first: float) -> str:
     if not (2.0 * math.pi * values.min() > 2.0 * first and 0.5 * first < values.max() and values.min() < 2.0 * first):
         return ""
     return f"all frequencies are far above the first resonance, {first:.6g} Hz: are they in rad/s?"
+
+
+def _faster_than_metals(result: Result) -> Iterator[Finding]:
+    """Wear coefficients, as that of examples, with which joints wear faster than those of metal."""
+    if result.wears and "wear_coefficient" in result.axes:
+        largest = float(result.dataset["wear_coefficient"].max())
+        times = largest / LARGEST_OF_METALS
+        text = f"wear_coefficient {show_number(largest)} 1/Pa is {times:.2g} times the {LARGEST_OF_METALS:g} of Ti-6Al-4V"
+        if times > _FAST:
+            yield Finding("coefficient", "note", f"{text}: give that of your materials", {"times_metal": times})
 
 
 def _too_few_counts(result: Result) -> str:
