@@ -1,6 +1,7 @@
 """The summary of a result: for the command, the page and notebooks; as data, and in at most nine rows."""
 
 import math
+import re
 import textwrap
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -35,6 +36,7 @@ _FAST = 10.0
 
 _MOST_FAILURES = 2
 _WIDTH, _LONGEST = 12, 240
+_NUMBER = re.compile(r"(?<=\d) (?=\S)")
 _PLAIN = str.maketrans({"±": "+-", "³": "3", "²": "2", "µ": "u", "√": " sqrt ", "\N{NO-BREAK SPACE}": " "})
 
 _AUTOMATIC = '"auto" in place of numbers of harmonics and samples'
@@ -75,8 +77,10 @@ class Summary:
     def lines(self) -> tuple[str, ...]:
         """Lines of plain text: label and text of each row, as wide as a terminal."""
         look: dict[str, Any] = {"width": MOST_COLUMNS, "subsequent_indent": " " * _WIDTH, "break_on_hyphens": False}
-        rows = (f"{label:<{_WIDTH}}{text}".translate(_PLAIN) for label, text in self.rows)
-        return tuple(line for row in rows for line in textwrap.wrap(row, **look))
+        # a number stays with its unit
+        texts = ((label, _NUMBER.sub("\N{NO-BREAK SPACE}", text.translate(_PLAIN))) for label, text in self.rows)
+        wrapped = (textwrap.wrap(f"{label:<{_WIDTH}}{text}", **look) for label, text in texts)
+        return tuple(line.translate(_PLAIN) for lines in wrapped for line in lines)
 
     def __str__(self) -> str:
         return "\n".join(self.lines)

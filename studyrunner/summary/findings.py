@@ -24,7 +24,7 @@ LEAST_ERROR = 1e-4
 """Relative error that is shown, of any smaller one."""
 
 _MOST_MODES = 4
-_MOST_ALIKE = 4
+_MOST_ALIKE = 3
 _SHARE = 0.5
 """Of the wear of a surface that lies at its edge: more, and more than its share of the area, is pointed out."""
 
@@ -143,19 +143,19 @@ def _deepest(result: Result, point: Point, at: int, where: str) -> Finding:
         depth = read("largest_wear_depth")
         return Finding("deepest", "deepest", _known(depth, math.nan, "m") + where, {"wear_depth": depth})
     depths = np.nan_to_num(last_depth(result, point), nan=0.0)
-    # of mirror pairs the first, and the others
-    pair, *others = np.flatnonzero(depths >= (1.0 - LEAST_ERROR) * depths.max()).tolist()
-    pairs, numbers = contact_pairs(result, point), result.dataset["contact"].values
+    pair, pairs, numbers = int(np.argmax(depths)), contact_pairs(result, point), result.dataset["contact"].values
     error = read("wear_depth_error", pair) if result.has("wear_depth_error") else read("wear_depth_max_error")
     surface = str(pairs.surface[pair]) if result.has("contact_surface") else ""
     number, place = int(numbers[pair]), pairs.position[pair].tolist()
     text = f"{_known(depths[pair], error, 'm')} at contact pair {number}" + (f" of {surface}" if surface else "")
     if np.isfinite(place).all():
         text += f", (x, y, z) = ({', '.join(f'{1e3 * each:.4g}' for each in place)}) mm"
-    also = [int(numbers[each]) for each in others]
+    # mirror pairs, for one
+    least = depths[pair] * (1.0 - LEAST_ERROR) - (error if error < SENSITIVE_ERROR * depths[pair] else 0.0)
+    also = [int(number) for number in numbers[depths >= least] if number != numbers[pair]]
     if also:
-        more = " and ".join(map(str, also)) if len(also) < _MOST_ALIKE else f"{len(also)} others"
-        text += f", and at pair{'s' * (len(also) > 1)} {more}"
+        more = f" and {len(also) - _MOST_ALIKE} others" if len(also) > _MOST_ALIKE else ""
+        text += f"; as deep within the error: pair {', '.join(map(str, also[:_MOST_ALIKE]))}{more}"
     text, share = text + where, math.nan
     if result.has("contact_surface", "contact_area", "contact_edge"):
         on_it = pairs.surface == surface
