@@ -123,12 +123,12 @@ LOOP_COMPONENTS = ("normal", "tangent_1", "tangent_2")
 
 CERTIFICATE = {
     "residual": "scaled residual",
-    "penetration": "penetration",
-    "tension": "tension",
-    "cone_violation": "violation of the friction cone",
-    "energy_error": "energy balance error",
-    "response_error": "estimated error of the response",
-    "wear_rate_error": "estimated error of the wear rate",
+    "penetration": "penetration over the largest motion",
+    "tension": "tension over the largest normal force",
+    "cone_violation": "friction above its limit, over the largest limit",
+    "energy_error": "imbalance of energy over the work of the excitation",
+    "response_error": "estimated relative error of the response",
+    "wear_rate_error": "estimated relative error of the wear rate",
 }
 """Those of them that say how right a state is, none of them negative and 0 the best: what a short table calls them."""
 

@@ -26,6 +26,10 @@ from studyrunner.variables import LOOP_COMPONENTS, LOOP_PHASES, LOOPS
 _LARGEST_HISTORY = 1e9  # bytes: a result is one message between ranks
 
 
+_OTHER_UNIT = 100.0
+"""Ratio of a value to its default from which its unit is asked about: of mm and GPa it is at least 1000."""
+
+
 @dataclass(frozen=True)
 class SceneFacts:
     """Facts of a scene, for the plan and the result file.
@@ -57,12 +61,34 @@ def build_study_scene(study: Study, progress: Progress = silent, known: ReducedM
     scene lacks what the study asks for.
     """
     with scene_errors(study.source, study.scene.path), np.errstate(all="ignore"):
-        model = _built(study, progress) if known is None else known
+        try:
+            model = _built(study, progress) if known is None else known
+        except SceneError as error:
+            key, value, default = farthest_from_default(study)
+            if key in ("", error.key):
+                raise
+            remedy = f"check its unit, its default is {default:g}; else see {error.key}, {error.value}: {error.remedy}"
+            raise SceneError(key, f"{value:g}", remedy) from error
     raise_wrong(study.source, _wrong_beside(study, model))
     if "natural_frequency" in study.scene_variables:
         with scene_errors(study.source, None):
             stuck_frequencies(model)
     return model
+
+
+def farthest_from_default(study: Study) -> tuple[str, float, float]:
+    """Key, value and default of the number of a bundled scene that is farthest from its default, if in another unit it
+    were near: at least a factor of `_OTHER_UNIT`; else "", 0, 0.
+    """
+    fields = type(study.scene.parameters).model_fields if study.scene.is_bundled else {}
+    given = {name: (getattr(study.scene.parameters, name), entry.default) for name, entry in fields.items()}
+    far = [
+        (abs(math.log(value / default)), name, value, default)
+        for name, (value, default) in given.items()
+        if isinstance(default, float) and isinstance(value, float) and default > 0.0 and value > 0.0
+    ]
+    distance, *found = max(far, default=(0.0, "", 0.0, 0.0))
+    return tuple(found) if distance > math.log(_OTHER_UNIT) else ("", 0.0, 0.0)
 
 
 def harmonics_to_build(study: Study) -> int:

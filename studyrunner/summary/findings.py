@@ -210,8 +210,8 @@ def _response(result: Result, point: Point, wears: bool, resonance: str) -> Find
         return Finding("response", result.followed, text, values)
     if not both.any():
         return Finding("response", "response", f"{name} does not move", values)
-    case = "there" if wears else f"most at {where_is(result, point)}"
-    text = f"{name}{f', {case}' if result.computed.size > 1 else ''}: amplitude {new}"
+    case = " at this point" if wears else f", most at {where_is(result, point)}"
+    text = f"{name}{case if result.computed.size > 1 else str()}: amplitude {new}"
     if wears:
         text += f" when new, {worn} when worn"
     frequency, peak = _peak(result, point, of)
