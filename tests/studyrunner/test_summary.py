@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 
 from solver.outcome import Outcome
+from studyrunner.report.page import _facts as page_facts
 from studyrunner.result.opening import as_history
 from studyrunner.result.view import Result
 from studyrunner.study.study_file import read_study
 from studyrunner.summary.answer import MOST_COLUMNS, MOST_ROWS, SMALL, summary
 from studyrunner.summary.findings import Finding, compare_meshes
 from studyrunner.units import show_percent, show_rtol
-from tests.studyrunner.fakes import FACTS
+from tests.studyrunner.fakes import FACTS, plan_of
 from tests.studyrunner.results import result_of_study
 
 GRID = ("axes.frequency=[210, 211.25, 212.5]", "axes.scheme=['implicit', 'explicit', 'adaptive']")
@@ -158,6 +159,11 @@ def test_where_a_followed_resonance_went():
     assert followed.values["response"]["frequency"] == [200.0, 180.0]
     assert followed.values["response"]["frequency_error"] == 0.25
     assert any(label == "resonance" for label, _ in followed.rows)
+    # the middle of its range is the frequency of nothing, and the scheme takes no step of `axes.step`
+    facts = dict(page_facts(result_of(made)))
+    assert (facts["frequency"], "step" in facts) == ("the resonance, followed", False)
+    plan = plan_of(read_study("sdof_slider", (*study, "axes.scheme=adaptive")))
+    assert all("Hz" not in task.describe(0) for task in (*plan.sweeps, *plan.results))
     told = 'axes.frequency = "resonance"'
     given = wearing("axes.frequency=150", response_amplitude=lambda _: np.ones((21, 1))).assign(stuck_frequency=25.0)
     assert [told in " ".join(str(summary(each)).split()) for each in (made, given)] == [False, True]
