@@ -179,7 +179,9 @@ def doubts_of_study(study: Study, facts: SceneFacts | None = None) -> tuple[str,
         # a blade root of 280 mm2 bears 1e5 N
         _question("excitation_amplitude", amplitude, ("N", 0.0, 1e6, {"mN": 1e-3}), "more than joints bear"),
         _question("friction_coefficient", friction, ("", 0.0, 2.0, {"percent": 0.01}), "more than dry metals have"),
-        _question("loss_factor", _numbers(parts, "loss_factor"), ("", 0.0, 0.5, {"percent": 0.01}), "more than metals have"),
+        _question(
+            "loss_factor", _numbers(parts, "loss_factor"), ("", 0.0, 0.5, {"percent": 0.01}), "more than metals have"
+        ),
         # 314 rad/s is 3000 rpm
         _question("rotation_speed", speed, ("rpm", 1000.0, math.inf, _UNITS_OF_SPEED), "slow for a machine"),
     ]
@@ -187,7 +189,9 @@ def doubts_of_study(study: Study, facts: SceneFacts | None = None) -> tuple[str,
     if key and not any(each.startswith(key) for each in found):
         found.append(f"scene.{key} = {value:g} is far from its default, {default:g}: is its unit meant?")
     if own and all(abs(each - 2.0 * math.pi * stuck) < 0.1 * each for each in own):
-        found.append(f"frequency {own[0]:.5g} Hz is near 2 pi times the first resonance, {stuck:.5g} Hz: is it in rad/s?")
+        found.append(
+            f"frequency {own[0]:.5g} Hz is near 2 pi times the first resonance, {stuck:.5g} Hz: is it in rad/s?"
+        )
     if own and 0.0 < stuck < math.inf:
         nearest = min(own, key=lambda frequency: abs(math.log(frequency / stuck)))
         near = ("Hz", stuck / _FAR, stuck * _FAR, {"kHz": 1e3, "mHz": 1e-3})

@@ -57,7 +57,9 @@ ASKED = {
     ),
     "slip_range": Variable(_PAIRS, "m", "range of the slip over a period", "Largest distance of two places."),
     "open_fraction": Variable(_PAIRS, "1", "fraction of the period in which the pair is open"),
-    "friction_use": Variable(_CYCLE, "1", "largest friction force over its limit", "Of any pair, at any time; 1 where one slips."),
+    "friction_use": Variable(
+        _CYCLE, "1", "largest friction force over its limit", "Of any pair, at any time; 1 where one slips."
+    ),
     "residual": Variable(_CYCLE, "1", "scaled residual of the harmonic balance"),
     "penetration": Variable(_CYCLE, "1", "largest penetration over the largest relative motion"),
     "tension": Variable(_CYCLE, "1", "largest tension over the largest normal force"),

@@ -193,7 +193,9 @@ def _faster_than_metals(result: Result) -> Iterator[Finding]:
     if result.wears and "wear_coefficient" in result.axes:
         largest = float(result.dataset["wear_coefficient"].max())
         times = largest / LARGEST_OF_METALS
-        text = f"wear_coefficient {show_number(largest)} 1/Pa is {times:.2g} times the {LARGEST_OF_METALS:g} of Ti-6Al-4V"
+        text = (
+            f"wear_coefficient {show_number(largest)} 1/Pa is {times:.2g} times the {LARGEST_OF_METALS:g} of Ti-6Al-4V"
+        )
         if times > _FAST:
             yield Finding("coefficient", "note", f"{text}: give that of your materials", {"times_metal": times})
 

@@ -211,7 +211,7 @@ def _response(result: Result, point: Point, wears: bool, resonance: str) -> Find
     if not both.any():
         return Finding("response", "response", f"{name} does not move", values)
     case = " at this point" if wears else f", most at {where_is(result, point)}"
-    text = f"{name}{case if result.computed.size > 1 else str()}: amplitude {new}"
+    text = f"{name}{case if result.computed.size > 1 else ''}: amplitude {new}"
     if wears:
         text += f" when new, {worn} when worn"
     frequency, peak = _peak(result, point, of)
