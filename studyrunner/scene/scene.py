@@ -87,8 +87,8 @@ def farthest_from_default(study: Study) -> tuple[str, float, float]:
         for name, (value, default) in given.items()
         if isinstance(default, float) and isinstance(value, float) and default > 0.0 and value > 0.0
     ]
-    distance, *found = max(far, default=(0.0, "", 0.0, 0.0))
-    return tuple(found) if distance > math.log(_OTHER_UNIT) else ("", 0.0, 0.0)
+    distance, key, value, default = max(far, default=(0.0, "", 0.0, 0.0))
+    return (key, value, default) if distance > math.log(_OTHER_UNIT) else ("", 0.0, 0.0)
 
 
 def harmonics_to_build(study: Study) -> int:
