@@ -188,10 +188,9 @@ def doubts_of_study(study: Study, facts: SceneFacts | None = None) -> tuple[str,
     key, value, default = farthest_from_default(study)
     if key and not any(each.startswith(key) for each in found):
         found.append(f"scene.{key} = {value:g} is far from its default, {default:g}: is its unit meant?")
-    if own and all(abs(each - 2.0 * math.pi * stuck) < 0.1 * each for each in own):
-        found.append(
-            f"frequency {own[0]:.5g} Hz is near 2 pi times the first resonance, {stuck:.5g} Hz: is it in rad/s?"
-        )
+    low, high = (end(own, default=0.0) / (2.0 * math.pi) for end in (min, max))
+    if stuck / math.pi < low < 2.0 * stuck and 0.5 * stuck < high:
+        found.append(f"frequencies are all far above the first resonance, {stuck:.5g} Hz: are they in rad/s?")
     if own and 0.0 < stuck < math.inf:
         nearest = min(own, key=lambda frequency: abs(math.log(frequency / stuck)))
         near = ("Hz", stuck / _FAR, stuck * _FAR, {"kHz": 1e3, "mHz": 1e-3})

@@ -77,18 +77,16 @@ def build_study_scene(study: Study, progress: Progress = silent, known: ReducedM
 
 
 def farthest_from_default(study: Study) -> tuple[str, float, float]:
-    """Key, value and default of the number of a bundled scene that is farthest from its default, if in another unit it
-    were near: at least a factor of `_OTHER_UNIT`; else "", 0, 0.
+    """Key, value and default of the number of a bundled scene that is farthest, `_OTHER_UNIT` times at least, from its
+    default; else "", 0, 0.
     """
-    fields = type(study.scene.parameters).model_fields if study.scene.is_bundled else {}
-    given = {name: (getattr(study.scene.parameters, name), entry.default) for name, entry in fields.items()}
-    far = [
-        (abs(math.log(value / default)), name, value, default)
-        for name, (value, default) in given.items()
-        if isinstance(default, float) and isinstance(value, float) and default > 0.0 and value > 0.0
-    ]
-    distance, key, value, default = max(far, default=(0.0, "", 0.0, 0.0))
-    return (key, value, default) if distance > math.log(_OTHER_UNIT) else ("", 0.0, 0.0)
+    fields, distance, found = type(study.scene.parameters).model_fields, math.log(_OTHER_UNIT), ("", 0.0, 0.0)
+    for name, entry in fields.items() if study.scene.is_bundled else ():
+        value, default = getattr(study.scene.parameters, name), entry.default
+        is_number = isinstance(default, float) and isinstance(value, float) and min(default, value) > 0.0
+        if is_number and (far := abs(math.log(value / default))) > distance:
+            distance, found = far, (name, value, default)
+    return found
 
 
 def harmonics_to_build(study: Study) -> int:

@@ -326,12 +326,6 @@ def test_depths_and_motions_that_no_model_has_are_asked_about(depth, motion, out
     assert all("211.25 Hz" in doubt for doubt in doubts)
 
 
-@pytest.mark.parametrize(("frequencies", "asked"), [("[150, 160]", True), ("[20, 25]", False), ("[400, 500]", False)])
-def test_frequencies_in_radians_are_asked_about(frequencies, asked):
-    made = wearing(f"axes.frequency={frequencies}").assign(stuck_frequency=25.0)
-    assert any("rad/s" in line for line in summary(made).lines) is asked
-
-
 # --- errors in percent ---
 
 
