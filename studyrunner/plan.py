@@ -11,7 +11,7 @@ from studyrunner.kinds import missions, modes, wear_plan
 from studyrunner.kinds.estimate import AUTOMATIC_HARMONICS, COMPILE_SECONDS, largest_memory, memory_a_rank
 from studyrunner.kinds.task import TaskPlan, Work, with_tasks
 from studyrunner.scene.answers import remarks_of_study
-from studyrunner.scene.scene import SceneFacts, values_of_point
+from studyrunner.scene.scene import SceneFacts, farthest_from_default, values_of_point
 from studyrunner.scene.scene_set import SceneSet, merge_facts, plan_scenes
 from studyrunner.study.sections import AUTO, SOLVER_AXES
 from studyrunner.study.study import MISSIONS, MODES, Study
@@ -176,9 +176,18 @@ def doubts_of_study(study: Study, facts: SceneFacts | None = None) -> tuple[str,
         # a blade root of 280 mm2 bears 1e5 N
         _question("excitation_amplitude", amplitude, ("N", 0.0, 1e6, {"mN": 1e-3}), "more than joints bear"),
         _question("friction_coefficient", friction, ("", 0.0, 2.0, {"percent": 0.01}), "more than dry metals have"),
+        _question(
+            "loss_factor", _numbers(parts, "loss_factor"), ("", 0.0, 0.5, {"percent": 0.01}), "more than metals have"
+        ),
         # 314 rad/s is 3000 rpm
         _question("rotation_speed", speed, ("rpm", 1000.0, math.inf, _UNITS_OF_SPEED), "slow for a machine"),
     ]
+    key, value, default = farthest_from_default(study)
+    if key and not any(each.startswith(key) for each in found):
+        found.append(f"scene.{key} = {value:g} is far from its default, {default:g}: is its unit meant?")
+    low, high = (end(own, default=0.0) / (2.0 * math.pi) for end in (min, max))
+    if stuck / math.pi < low < 2.0 * stuck and 0.5 * stuck < high:
+        found.append(f"frequencies are all far above the first resonance, {stuck:.5g} Hz: are they in rad/s?")
     if own and 0.0 < stuck < math.inf:
         nearest = min(own, key=lambda frequency: abs(math.log(frequency / stuck)))
         near = ("Hz", stuck / _FAR, stuck * _FAR, {"kHz": 1e3, "mHz": 1e-3})

@@ -73,6 +73,8 @@ def compute_study(
     with display:
         for line in _notes(ranks, study, scenes, store, facts):
             display.say(line)
+        if target.old is not None:
+            display.say(f"{target.path.name} has the result of other values, and is kept as {target.old.name}")
         run = StudyRun(completion, scenes.models, display, ranks.size)
         if run.n_points:
             display.say(f"from an earlier run: {run.n_points} of {count(plan.n_points, 'point')}")

@@ -57,6 +57,9 @@ ASKED = {
     ),
     "slip_range": Variable(_PAIRS, "m", "range of the slip over a period", "Largest distance of two places."),
     "open_fraction": Variable(_PAIRS, "1", "fraction of the period in which the pair is open"),
+    "friction_use": Variable(
+        _CYCLE, "1", "largest friction force over its limit", "Of any pair, at any time; 1 where one slips."
+    ),
     "residual": Variable(_CYCLE, "1", "scaled residual of the harmonic balance"),
     "penetration": Variable(_CYCLE, "1", "largest penetration over the largest relative motion"),
     "tension": Variable(_CYCLE, "1", "largest tension over the largest normal force"),
@@ -122,12 +125,12 @@ LOOP_COMPONENTS = ("normal", "tangent_1", "tangent_2")
 
 CERTIFICATE = {
     "residual": "scaled residual",
-    "penetration": "penetration",
-    "tension": "tension",
-    "cone_violation": "violation of the friction cone",
-    "energy_error": "energy balance error",
-    "response_error": "estimated error of the response",
-    "wear_rate_error": "estimated error of the wear rate",
+    "penetration": "penetration over the largest motion",
+    "tension": "tension over the largest normal force",
+    "cone_violation": "friction above its limit, over the largest limit",
+    "energy_error": "imbalance of energy over the work of the excitation",
+    "response_error": "estimated relative error of the response",
+    "wear_rate_error": "estimated relative error of the wear rate",
 }
 """Those of them that say how right a state is, none of them negative and 0 the best: what a short table calls them."""
 

@@ -29,8 +29,8 @@ _ALONE: dict[str, Any] = {
 """Keys of a study of unworn states of one point."""
 
 _HOW = (
-    "Computed again from the wear depths of the file: the joint is mounted worn, and the sweep leads to the frequency;"
-    " its friction forces at the start are not those at the end of the wear history"
+    "Mounted again after wear: computed again from the wear depths of the file, by a sweep to each frequency; its"
+    " friction forces, and with them its amplitudes, are not those at the end of the wear history"
 )
 
 

@@ -7,7 +7,7 @@ import numpy as np
 from numba import njit
 
 from solver.accuracy.certificate import Certificate
-from solver.contact.coulomb import SEPARATED
+from solver.contact.coulomb import SEPARATED, friction_limit
 from solver.continuation.transient import Transient
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.state import State, largest_responses, state_of
@@ -54,6 +54,7 @@ def report_state(
         "mean_pressure": evaluation.force_h[:, 0, 0] / joint.contact.area,
         "slip_range": largest_distance(evaluation.state_t) / joint.law.state_stiffness,
         "open_fraction": (evaluation.status_t == SEPARATED).mean(axis=1),
+        "friction_use": friction_use(joint, evaluation),
         "response": to_complex(response_h)[:, 0],
         "response_mean": response_h[:, 0],
         "response_peak": largest_responses(joint, evaluation),
@@ -69,6 +70,14 @@ def report_state(
         resonance, slope = resonance_frequency(joint, evaluation)
         found |= {"resonance": resonance, "resonance_error": slope * certificate.response_error}
     return found
+
+
+def friction_use(joint: Joint, evaluation: Evaluation) -> float:
+    """Largest friction force of any pair over its limit, at any sample; 1 where a pair slips, 0 without friction."""
+    force_t = evaluation.force_t
+    limit = friction_limit(joint.contact.friction[:, None], force_t[:, 0])
+    size = np.hypot(force_t[:, 1], force_t[:, 2])
+    return float(np.divide(size, limit, out=np.zeros_like(size), where=limit > 0.0).max(initial=0.0))
 
 
 def resonance_frequency(joint: Joint, evaluation: Evaluation) -> tuple[float, float]:

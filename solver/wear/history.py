@@ -65,10 +65,9 @@ def _unknown_course(model: ReducedModel, n_loops: int) -> Course:
     values: dict[str, Any] = dict.fromkeys(("mean_pressure", "slip_range", "open_fraction"), of_pairs)
     values |= dict.fromkeys(("response_mean", "response_peak"), of_responses) | {"response": of_responses + 0j}
     values |= dict.fromkeys(("loop_displacement", "loop_force"), np.full((n_loops, LOOP_PHASES, 3), np.nan))
-    values |= dict.fromkeys(
-        ("excitation_frequency", "excitation_frequency_error", "local", "resolution_error"), math.nan
-    )
+    values |= dict.fromkeys(("friction_use", "excitation_frequency", "excitation_frequency_error"), math.nan)
     values |= vars(NOT_CERTIFIED) | {"harmonics_used": 0, "samples_used": 0}
+    values |= {"local": math.nan, "resolution_error": math.nan}
     # before all counts
     return Course(model.contact.area, nodes=(Node(-1.0, of_pairs, of_pairs, values),))
 

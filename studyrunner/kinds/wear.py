@@ -43,6 +43,10 @@ class Excitation:
     direction: str
     follow: FollowedFrequency | None
 
+    def at(self, frequency: float) -> str:
+        """Where a point is, in words: at its frequency, Hz, or at what the frequency follows."""
+        return f"{frequency:.6g} Hz" if self.follow is None else f"the {self.follow.of}"
+
 
 @dataclass(frozen=True)
 class Integrated:
@@ -156,7 +160,7 @@ class Sweep(_FromRest):
     def describe(self, place: int) -> str:
         """Where the sweep goes."""
         how = self.way if self.way == "ramp" else f"sweep {self.excitation.direction}"
-        return f"{how} to {self.frequencies[place]:.6g} Hz"
+        return f"{how} to {self.excitation.at(self.frequencies[place])}"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -263,7 +267,7 @@ class History(_FromRest):
 
     def describe(self, place: int) -> str:
         """Its frequency and scheme."""
-        return f"{self.frequency:.6g} Hz {self.results[place][0].scheme}"
+        return f"{self.excitation.at(self.frequency)} {self.results[place][0].scheme}"
 
 
 def build_result(task: History, integrated: Integrated, history: "WearHistory", place: int = 0) -> PointResult:

@@ -15,10 +15,14 @@ WEAR, MISSIONS, MODES = "wear histories", "missions", "modes"
 """Kinds of results."""
 
 _BANDS, _BARS = "Bands: estimated errors", "Bars: estimated errors, none where they are smaller than the markers"
-_OTHERS = "Each point is another joint, which wore at its own value of the horizontal axis"
-_QUANTILES = "So much is worn at most in 5, 25, 50, 75 and 95 % of the samples, each less or more its numerical error"
+_OTHERS = "Each value of the horizontal axis is a separate joint, which has worn at this value alone"
+_QUANTILES = (
+    "Line: half of the samples wear less. Bands: from 5 to 95 % and from 25 to 75 % of the samples, widened by the"
+    " numerical errors"
+)
 CAPTIONS = {
-    "blocks": "Cycles of one mission. A passage whose rate is far below (zeta f)² wears as its steady states do",
+    "blocks": "Cycles of one mission. A passage far below 1 in the last column wears as its steady vibrations do; f:"
+    " frequency, zeta: damping ratio of the joint at rest",
     "block_shares": f"Above, shares of the blocks in the volume worn in one mission. {_BANDS}",
     "block_responses": f"Amplitude of the first harmonic in the mission that ends at the number. {_BANDS}",
     "natural_frequency": _BARS,

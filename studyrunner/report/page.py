@@ -33,7 +33,7 @@ from studyrunner.system.process import raise_ending
 from studyrunner.system.progress import count
 from studyrunner.units import Scale, scale_for, show_number, units_of
 from studyrunner.user_error import show_text
-from studyrunner.variables import CERTIFICATE
+from studyrunner.variables import CERTIFICATE, OWN_STEPS
 
 DATA_LIMIT = 5e6
 """Most characters of numbers of the interactive part, those of the root in three dimensions aside."""
@@ -103,7 +103,12 @@ def _build_page(result: Result, parts: Sequence[Any]) -> str:
 def _facts(result: Result) -> list[tuple[str, str]]:
     """Names and values: points, axes, contact pairs, versions."""
     facts = [("points", f"{result.computed.size}, {np.count_nonzero(result.computed)} computed to the end")]
-    for name in result.axes:
+    schemes = result.dataset["scheme"].values.tolist() if "scheme" in result.axes else []
+    # the middle of the range of a followed resonance, and steps that no scheme takes, say nothing
+    unused = {"frequency"} if result.followed else set[str]()
+    unused |= {"step"} if schemes and {*schemes} <= {*OWN_STEPS} else set()
+    facts += [("frequency", f"the {result.followed}, followed")] if result.followed else []
+    for name in (name for name in result.axes if name not in unused):
         axis = result.dataset[name]
         numbers, units = axis.dtype.kind in "fiu", units_of(axis)
         values = [show_number(float(value)) if numbers else str(value) for value in axis.values]

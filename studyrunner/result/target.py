@@ -10,6 +10,7 @@ from typing import Any
 
 from studyrunner.checkpoint.store import read_study
 from studyrunner.study.study import Study
+from studyrunner.study.study_file import format_study
 from studyrunner.study.text import read_archived, read_toml
 from studyrunner.system.machine import find_fault, new_partial
 from studyrunner.user_error import UserError
@@ -20,11 +21,12 @@ _BYTES_OF_TRIAL = 4096  # a full disk has room for a name
 @dataclass(frozen=True)
 class Target:
     """Path of a result. finished: whether a result without missing points exists, which only another such result
-    replaces.
+    replaces. old: where a result of other values, which exists, is kept when it is replaced; None without one.
     """
 
     path: Path
     finished: bool = False
+    old: Path | None = None
 
     @property
     def progress(self) -> Path:
@@ -83,25 +85,31 @@ def check_result(option: str, path: Path, study: Study, *, overwrite: bool, how:
     """Target of a result, after `check_output` and a test that nothing forbids to replace what exists there.
 
     overwrite: whether a result of another study may be replaced. how: the user asks for that, in words. Raises
-    UserError where what exists, or its progress, is no result of run-study or belongs to another study.
+    UserError where what exists, or its progress, is no result of run-study or belongs to another study, or where a file
+    that the study reads has the name under which it would be kept.
     """
     target = Target(check_output(option, path, study.files))
-    name, (existing, finished) = identity_of(study.study.name, study.scene.model), _read_result(option, target.path)
+    name = identity_of(study.study.name, study.scene.model)
+    existing, finished, text = _read_result(option, target.path)
     for file, other in ((target.path, existing), (target.progress, read_study(target.progress))):
         if other is not None and other != name and not overwrite:
             remedy = f"give another name or {how}: {file.name} is of {other}, this is {name}"
             raise UserError("command line", option, str(target.path), remedy)
-    return Target(target.path, finished)
+    if not text or text == format_study(study):
+        return Target(target.path, finished)
+    old = target.path.with_name(f"{target.path.name}.old")
+    return Target(target.path, finished, check_output(option, old, study.files))
 
 
-def _read_result(option: str, path: Path) -> tuple[str | None, bool]:
-    """Identity of the study of an existing result, None without one, and whether the result is finished."""
+def _read_result(option: str, path: Path) -> tuple[str | None, bool, str]:
+    """Identity of the study of an existing result, None without one, whether the result is finished, its study."""
     with contextlib.suppress(OSError, KeyError, TypeError, UserError):
         # damaged, or unreadable: it may be anything
         if not path.exists() or path.stat().st_size == 0:
-            return None, False
+            return None, False, ""
         archived = read_archived(path, "")
         table: Any = read_toml(archived.study.encode(), "")
-        return identity_of(str(table["study"]["name"]), str(table["scene"]["model"])), archived.is_finished
+        identity = identity_of(str(table["study"]["name"]), str(table["scene"]["model"]))
+        return identity, archived.is_finished, archived.study
     remedy = "remove the file or give another name: it is no result of run-study that can be read, and is left as it is"
     raise UserError("command line", option, str(path), remedy)

@@ -63,7 +63,7 @@ def write_result(
             outcomes.update(records["outcome"].tolist())
         return outcomes
     try:
-        with replacing(target.path) as temporary, _writing(temporary) as file:
+        with replacing(target.path, target.old) as temporary, _writing(temporary) as file:
             file.setncatts(origin)
             variables = _create_all(file, study, facts, slab, arrays)
             for region, records in _slabs(shape, slab, completion, keys):

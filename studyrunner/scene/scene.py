@@ -26,6 +26,10 @@ from studyrunner.variables import LOOP_COMPONENTS, LOOP_PHASES, LOOPS
 _LARGEST_HISTORY = 1e9  # bytes: a result is one message between ranks
 
 
+_OTHER_UNIT = 100.0
+"""Ratio of a value to its default from which its unit is asked about: of mm and GPa it is at least 1000."""
+
+
 @dataclass(frozen=True)
 class SceneFacts:
     """Facts of a scene, for the plan and the result file.
@@ -57,12 +61,32 @@ def build_study_scene(study: Study, progress: Progress = silent, known: ReducedM
     scene lacks what the study asks for.
     """
     with scene_errors(study.source, study.scene.path), np.errstate(all="ignore"):
-        model = _built(study, progress) if known is None else known
+        try:
+            model = _built(study, progress) if known is None else known
+        except SceneError as error:
+            key, value, default = farthest_from_default(study)
+            if key in ("", error.key):
+                raise
+            remedy = f"check its unit, its default is {default:g}; else see {error.key}, {error.value}: {error.remedy}"
+            raise SceneError(key, f"{value:g}", remedy) from error
     raise_wrong(study.source, _wrong_beside(study, model))
     if "natural_frequency" in study.scene_variables:
         with scene_errors(study.source, None):
             stuck_frequencies(model)
     return model
+
+
+def farthest_from_default(study: Study) -> tuple[str, float, float]:
+    """Key, value and default of the number of a bundled scene that is farthest, `_OTHER_UNIT` times at least, from its
+    default; else "", 0, 0.
+    """
+    fields, distance, found = type(study.scene.parameters).model_fields, math.log(_OTHER_UNIT), ("", 0.0, 0.0)
+    for name, entry in fields.items() if study.scene.is_bundled else ():
+        value, default = getattr(study.scene.parameters, name), entry.default
+        is_number = isinstance(default, float) and isinstance(value, float) and min(default, value) > 0.0
+        if is_number and (far := abs(math.log(value / default))) > distance:
+            distance, found = far, (name, value, default)
+    return found
 
 
 def harmonics_to_build(study: Study) -> int:

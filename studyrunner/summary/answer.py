@@ -1,6 +1,8 @@
-"""The summary of a result: for the command, the page and notebooks; as data, and in at most nine lines."""
+"""The summary of a result: for the command, the page and notebooks; as data, and in at most nine rows."""
 
 import math
+import re
+import textwrap
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,10 +17,10 @@ from studyrunner.result.pairs import contact_pairs
 from studyrunner.result.view import Result
 from studyrunner.summary.findings import LEAST_ERROR, Finding, what_came_out, where_is
 from studyrunner.system.progress import count
-from studyrunner.units import scale_for, show_percent, show_rtol
+from studyrunner.units import scale_for, show_number, show_percent, show_rtol
 from studyrunner.variables import OWN_STEPS
 
-MOST_LINES = 9
+MOST_ROWS, MOST_COLUMNS = 9, 100
 
 SMALL = 0.1
 """Largest depth over the width of the contact that is called small: slopes and stiffness change by that order."""
@@ -26,8 +28,10 @@ SMALL = 0.1
 _LARGEST = 100.0
 """Size, m, of a model without a mesh: masses on springs that are usual in textbooks move by some 10 m."""
 
+_OF_TITANIUM, _FAST = 4e-13, 10.0  # wear coefficient of Ti-6Al-4V, 1/Pa, and how many times it is pointed out
 _MOST_FAILURES = 2
 _WIDTH, _LONGEST = 12, 240
+_NUMBER = re.compile(r"(?<=\d) (?=\S)")
 _PLAIN = str.maketrans({"±": "+-", "³": "3", "²": "2", "µ": "u", "√": " sqrt ", "\N{NO-BREAK SPACE}": " "})
 
 _AUTOMATIC = '"auto" in place of numbers of harmonics and samples'
@@ -62,12 +66,16 @@ class Summary:
         """Label and text, in the order in which an engineer asks: the answer, failures, certainty."""
         rows = [(each.label, each.text) for each in self.findings]
         last = [row for row in rows[-1:] if row[0] == "certainty"]
-        return (*rows[: len(rows) - len(last)][: MOST_LINES - 1], *last)
+        return (*rows[: len(rows) - len(last)][: MOST_ROWS - 1], *last)
 
     @property
     def lines(self) -> tuple[str, ...]:
-        """Lines of plain text: label and text of each row."""
-        return tuple(f"{label:<{_WIDTH}}{text}".translate(_PLAIN) for label, text in self.rows)
+        """Lines of plain text: label and text of each row, as wide as a terminal."""
+        look: dict[str, Any] = {"width": MOST_COLUMNS, "subsequent_indent": " " * _WIDTH, "break_on_hyphens": False}
+        # a number stays with its unit
+        texts = ((label, _NUMBER.sub("\N{NO-BREAK SPACE}", text.translate(_PLAIN))) for label, text in self.rows)
+        wrapped = (textwrap.wrap(f"{label:<{_WIDTH}}{text}", **look) for label, text in texts)
+        return tuple(line.translate(_PLAIN) for lines in wrapped for line in lines)
 
     def __str__(self) -> str:
         return "\n".join(self.lines)
@@ -85,9 +93,10 @@ def summarise(result: Result) -> Summary:
     resonance = float(stuck) if stuck.ndim == 0 else math.nan
     findings, doubts = [*what_came_out(result, resonance)], list[str]()
     if not result.has_modes:
-        doubts += [_not_small(result), _too_far(result), _in_radians(result, resonance), _too_few_counts(result)]
+        doubts += [_not_small(result), _too_far(result), _too_few_counts(result)]
     wore = not any(each.name == "wear" and each.values.get("worn_volume") == 0.0 for each in findings)
     findings += [*(Finding("doubt", "beware", doubt) for doubt in doubts if doubt), *_failures(result)]
+    findings += _faster_than_metals(result)
     if certainty := certainty_of(result, wore=wore):
         findings.append(certainty)
     return Summary(result.computed.size, int(result.computed.sum()), tuple(findings))
@@ -164,14 +173,12 @@ def _too_far(result: Result) -> str:
     return f"a response moves by {by} at {at}, more than {than}: check the unit of the excitation, N, and of the model"
 
 
-def _in_radians(result: Result, first: float) -> str:
-    """Frequencies that are all far above the first resonance, Hz, and near it if they are in rad/s."""
-    if math.isnan(first) or "frequency" not in result.axes:
-        return ""
-    values = result.dataset["frequency"].values / (2.0 * math.pi)
-    if not (2.0 * math.pi * values.min() > 2.0 * first and 0.5 * first < values.max() and values.min() < 2.0 * first):
-        return ""
-    return f"all frequencies are far above the first resonance, {first:.6g} Hz: are they in rad/s?"
+def _faster_than_metals(result: Result) -> Iterator[Finding]:
+    """Wear coefficients, as that of examples, with which joints wear faster than those of metal."""
+    largest = float(result.dataset["wear_coefficient"].max()) if "wear_coefficient" in result.axes else 0.0
+    if result.wears and (times := largest / _OF_TITANIUM) > _FAST:
+        text = f"wear_coefficient {show_number(largest)} 1/Pa is {times:.2g} times the {_OF_TITANIUM:g} of Ti-6Al-4V"
+        yield Finding("coefficient", "note", f"{text}: give that of your materials", {"times_metal": times})
 
 
 def _too_few_counts(result: Result) -> str:

@@ -24,6 +24,7 @@ LEAST_ERROR = 1e-4
 """Relative error that is shown, of any smaller one."""
 
 _MOST_MODES = 4
+_MOST_ALIKE = 3
 _SHARE = 0.5
 """Of the wear of a surface that lies at its edge: more, and more than its share of the area, is pointed out."""
 
@@ -142,13 +143,19 @@ def _deepest(result: Result, point: Point, at: int, where: str) -> Finding:
         depth = read("largest_wear_depth")
         return Finding("deepest", "deepest", _known(depth, math.nan, "m") + where, {"wear_depth": depth})
     depths = np.nan_to_num(last_depth(result, point), nan=0.0)
-    pair, pairs = int(np.argmax(depths)), contact_pairs(result, point)
+    pair, pairs, numbers = int(np.argmax(depths)), contact_pairs(result, point), result.dataset["contact"].values
     error = read("wear_depth_error", pair) if result.has("wear_depth_error") else read("wear_depth_max_error")
     surface = str(pairs.surface[pair]) if result.has("contact_surface") else ""
-    number, place = int(result.dataset["contact"].values[pair]), pairs.position[pair].tolist()
+    number, place = int(numbers[pair]), pairs.position[pair].tolist()
     text = f"{_known(depths[pair], error, 'm')} at contact pair {number}" + (f" of {surface}" if surface else "")
     if np.isfinite(place).all():
         text += f", (x, y, z) = ({', '.join(f'{1e3 * each:.4g}' for each in place)}) mm"
+    # mirror pairs, for one
+    least = depths[pair] * (1.0 - LEAST_ERROR) - (error if error < SENSITIVE_ERROR * depths[pair] else 0.0)
+    also = [int(number) for number in numbers[depths >= least] if number != numbers[pair]]
+    if also:
+        more = f" and {len(also) - _MOST_ALIKE} others" if len(also) > _MOST_ALIKE else ""
+        text += f"; as deep within the error: pair {', '.join(map(str, also[:_MOST_ALIKE]))}{more}"
     text, share = text + where, math.nan
     if result.has("contact_surface", "contact_area", "contact_edge"):
         on_it = pairs.surface == surface
@@ -158,13 +165,13 @@ def _deepest(result: Result, point: Point, at: int, where: str) -> Finding:
             if share > max(_SHARE, of_area):
                 text += f"; {show_percent(share)} of the wear of {surface} is in edge pairs:"
                 text += " valid if the real contact ends there, else extend the model"
-    values = {"wear_depth": float(depths[pair]), "error": error, "contact": number, "surface": surface}
+    values = {"wear_depth": float(depths[pair]), "error": error, "contact": number, "also": also, "surface": surface}
     return Finding("deepest", "deepest", text, values | {"position": place, "edge_share": float(share)})
 
 
 def _nothing(result: Result, resonance: str) -> Finding:
     """Why no point whose worn volume is known wears."""
-    slip, why = math.nan, ""
+    slip, why, used = math.nan, "", math.nan
     if result.has("slip_range"):
         largest = result.over_points("slip_range", lambda values: np.nan_to_num(values).max(axis=-1))
         slip = float(largest[result.best_known].max())
@@ -174,8 +181,11 @@ def _nothing(result: Result, resonance: str) -> Finding:
     where = f"at all {n_points} points" if n_points > 1 else f"at {where_is(result, result.shown)}"
     if n_known < n_points:
         where = f"at {n_known} of {count(n_points, 'point')}, the worn volume of the others is not known"
+    if not slip and result.has("friction_use"):
+        used = float(result.of_points("friction_use", 0)[result.best_known].max())
+        where += f", with at most {show_percent(used)} of the friction that they can bear" if used > 0.0 else ""
     text = f"nothing wore{why} {where}" + (f" ({resonance})" if resonance else "")
-    return Finding("wear", "wear", text, {"worn_volume": 0.0, "largest_slip": slip})
+    return Finding("wear", "wear", text, {"worn_volume": 0.0, "largest_slip": slip, "friction_use": used})
 
 
 def _response(result: Result, point: Point, wears: bool, resonance: str) -> Finding:
@@ -200,15 +210,16 @@ def _response(result: Result, point: Point, wears: bool, resonance: str) -> Find
         return Finding("response", result.followed, text, values)
     if not both.any():
         return Finding("response", "response", f"{name} does not move", values)
-    case = " in this case" if wears else f", most at {where_is(result, point)}"
+    case = " at this point" if wears else f", most at {where_is(result, point)}"
     text = f"{name}{case if result.computed.size > 1 else ''}: amplitude {new}"
     if wears:
-        elsewhere = " (its resonance may lie elsewhere)" if both[1] < both[0] and not result.followed else ""
-        text += f" when new, {worn} when worn{elsewhere}"
+        text += f" when new, {worn} when worn"
     frequency, peak = _peak(result, point, of)
     if math.isfinite(frequency):
         text += f"; the new joint responds most at {frequency:.6g} Hz ({_show(peak, 'm')})"
-    text += f"; {resonance}" if wears and resonance else ""
+    if wears and resonance:
+        follow = 'the moving resonance was not computed: axes.frequency = "resonance" follows it'
+        text += f"; {resonance}; {follow}" if "frequency" in result.axes else f"; {resonance}"
     return Finding("response", "response", text, values | {"peak": frequency})
 
 

@@ -56,10 +56,11 @@ def remove_leftovers(path: Path) -> None:
 
 
 @contextlib.contextmanager
-def replacing(path: Path) -> Iterator[Path]:
+def replacing(path: Path, old: Path | None = None) -> Iterator[Path]:
     """Gives the name of an empty new file beside `path`, which takes its place at the end, whole and on the disk.
 
-    Where the block raises, or what follows it, `path` is as it was. Raises OSError.
+    Where the block raises, or what follows it, `path` is as it was. Raises OSError. old: name that what was at `path`
+    has then; None where it is not kept.
     """
     partial = new_partial(path)
     partial.touch(exist_ok=False)
@@ -67,6 +68,8 @@ def replacing(path: Path) -> Iterator[Path]:
         yield partial
         with partial.open("rb+") as file:
             os.fsync(file.fileno())
+        if old is not None and path.exists():
+            os.replace(path, old)
         os.replace(partial, path)
         sync_folder(path.parent)
     finally:

@@ -61,6 +61,11 @@ def test_the_report_is_that_of_the_time_signals(kinds):
     pressure = at.force_h[:, 0, 0] / model.contact.area
     assert report["mean_pressure"] == pytest.approx(pressure, rel=1e-12, abs=0.0)
     assert report["open_fraction"] == pytest.approx((at.force_t[:, 0] == 0).mean(axis=1))
+    used = np.linalg.norm(at.force_t[:, 1:], axis=1) / np.where(
+        at.force_t[:, 0] > 0.0, FRICTION * at.force_t[:, 0], np.inf
+    )
+    assert report["friction_use"] == pytest.approx(used.max())
+    assert used.max() == pytest.approx(1.0)
     slip = at.state_t / joint.penalty.tangential[:, None, None]
     for pair in range(model.contact.n_contact):
         distances = np.linalg.norm(slip[pair, :, :, None] - slip[pair, :, None, :], axis=0)

@@ -55,7 +55,7 @@ class Solver:
 
 # --- histories ---
 
-LIKE_VOLUME = ("worn_volume", "wear_rate", "penetration", "tension", "cone_violation", "energy_error")
+LIKE_VOLUME = ("worn_volume", "wear_rate", "penetration", "tension", "cone_violation", "energy_error", "friction_use")
 LIKE_DEPTH = ("wear_depth", "mean_pressure", "slip_range", "open_fraction", "response_mean", "response_peak")
 
 

@@ -61,7 +61,9 @@ def test_what_is_left_of_another_study_stays(leave, other, name, solver, monkeyp
     assert main([*other, "--overwrite"]) == 0
     with xr.open_dataset("out.nc") as result:
         assert f'name = "{name}"' in result.attrs["study"]
-    # it is this one's now
+    # it is this one's now, and the first study cannot read what it replaces
+    again = ["out.nc.old", "-o", "out.nc", "--overwrite"]
+    assert not Path("out.nc.old").exists() or main(again) == 2
     assert main(other) == 0
     assert main(SMALL) == 2
 
@@ -112,6 +114,10 @@ def test_a_finished_result_is_not_replaced_by_less(command, solver, capsys):
     with xr.open_dataset("out.nc") as result:
         assert (result.outcome == 0).all()
         assert result.attrs[POINTS_LEFT] == 0
+    # of other values the first one is kept, also when the second is computed again
+    assert main(command) == 0
+    old = Path("out.nc.old")
+    assert (old.read_bytes() if old.exists() else None) == (None if "--fresh" in command else before)
 
 
 @pytest.mark.slow

@@ -196,6 +196,12 @@ def test_the_exact_answer_is_that_of_the_wear_law_and_of_the_worn_start(changes,
     assert response.values.ravel()[0] == pytest.approx(expected, rel=1e-3, nan_ok=True)
 
 
+@pytest.mark.parametrize("key", ["young_modulus=110", "blade_length=160.0"])
+def test_of_a_sector_that_cannot_be_built_the_key_in_another_unit_is_named(key, folder, capsys):
+    assert main(["dovetail", "--plan", *options("scene.mesh=1", f"scene.{key}")]) == 2
+    assert capsys.readouterr().err.startswith(f"run-study: dovetail: scene.{key.split('=')[0]} = 1")
+
+
 def test_a_sector_that_spins_too_fast_is_bad_input(folder, monkeypatch, capsys):
     """The nodal diameters of the study are fine, another one is not: known before anything is computed."""
 

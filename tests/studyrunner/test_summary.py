@@ -7,13 +7,14 @@ import numpy as np
 import pytest
 
 from solver.outcome import Outcome
+from studyrunner.report.page import _facts as page_facts
 from studyrunner.result.opening import as_history
 from studyrunner.result.view import Result
 from studyrunner.study.study_file import read_study
-from studyrunner.summary.answer import MOST_LINES, SMALL, summary
+from studyrunner.summary.answer import MOST_COLUMNS, MOST_ROWS, SMALL, summary
 from studyrunner.summary.findings import Finding, compare_meshes
 from studyrunner.units import show_percent, show_rtol
-from tests.studyrunner.fakes import FACTS
+from tests.studyrunner.fakes import FACTS, plan_of
 from tests.studyrunner.results import result_of_study
 
 GRID = ("axes.frequency=[210, 211.25, 212.5]", "axes.scheme=['implicit', 'explicit', 'adaptive']")
@@ -100,6 +101,12 @@ def test_the_deepest_pair_with_its_place_and_the_wear_at_the_edge(name):
         assert deepest["edge_share"] == pytest.approx(edge)
         text = "\n".join(summary(made).lines)
         assert ("edge pairs" in text) is (edge > 0.5)
+        assert deepest["also"] == []
+    # mirror pairs are as deep
+    depth = np.array([1.0, 5.0, 2.0, 0.0, 5.0, 0.0])
+    depth = np.outer(share, depth) if name == "wear_depth" else depth
+    found = summary(result_of_study(study, BY_SIX, worn_volume=lambda _: share, **{name: lambda _: depth}))
+    assert (found.values["deepest"]["contact"], found.values["deepest"]["also"]) == (1, [4])
 
 
 # --- nothing wore ---
@@ -107,7 +114,9 @@ def test_the_deepest_pair_with_its_place_and_the_wear_at_the_edge(name):
 
 def test_nothing_wore_says_why():
     still = summary(wearing("axes.frequency=[1, 2, 3]", "axes.scheme=adaptive", volume=lambda _: 0.0))
-    assert still.values["wear"] == {"worn_volume": 0.0, "largest_slip": 0.0}
+    assert still.values["wear"] == {"worn_volume": 0.0, "largest_slip": 0.0, "friction_use": 0.0}
+    near = wearing("axes.frequency=[1, 2]", volume=lambda _: 0.0, friction_use=lambda p: np.full(21, 0.4 + 0.1 * p[0]))
+    assert summary(near).values["wear"]["friction_use"] == 0.5
     slips = wearing("axes.frequency=[1, 2]", volume=lambda _: 0.0, slip_range=lambda p: np.full((21, 2), 1e-6 * p[0]))
     assert summary(slips).values["wear"]["largest_slip"] == 1e-6
     some = wearing(*GRID, volume=lambda _: 0.0, outcome=lambda p: FAILED if p[0] else 0)
@@ -119,7 +128,7 @@ def test_nothing_wore_says_why():
     assert "at 1 of 2 points" in summary(unknown).lines[0]
     dovetail = read_study("dovetail", ("axes.frequency=[1, 2, 3]", "axes.scheme=adaptive"))
     stuck = summary(result_of_study(dovetail).assign(stuck_frequency=212.6))
-    assert "nothing wore: all pairs stick at all 3 points (first resonance 212.6 Hz" in stuck.lines[0]
+    assert "nothing wore: all pairs stick at all 3 points (first resonance 212.6 Hz" in dict(stuck.rows)["wear"]
     assert stuck.values["certainty"]["of"] == "response"
 
 
@@ -151,6 +160,20 @@ def test_where_a_followed_resonance_went():
     assert followed.values["response"]["frequency"] == [200.0, 180.0]
     assert followed.values["response"]["frequency_error"] == 0.25
     assert any(label == "resonance" for label, _ in followed.rows)
+    # the middle of its range is the frequency of nothing, and the scheme takes no step of `axes.step`
+    facts = dict(page_facts(result_of(made)))
+    assert (facts["frequency"], "step" in facts) == ("the resonance, followed", False)
+    plan = plan_of(read_study("sdof_slider", (*study, "axes.scheme=adaptive")))
+    assert all("Hz" not in task.describe(0) for task in (*plan.sweeps, *plan.results))
+    told = 'axes.frequency = "resonance"'
+    given = wearing("axes.frequency=150", response_amplitude=lambda _: np.ones((21, 1))).assign(stuck_frequency=25.0)
+    assert [told in " ".join(str(summary(each)).split()) for each in (made, given)] == [False, True]
+
+
+@pytest.mark.parametrize(("coefficient", "is_said"), [(1.1e-11, True), (4e-13, False)])
+def test_a_coefficient_that_metals_do_not_have_is_said(coefficient, is_said):
+    found = summary(wearing("axes.frequency=1", f"axes.wear_coefficient={coefficient}")).values
+    assert ("coefficient" in found) is is_said
 
 
 def test_the_shortest_life():
@@ -241,9 +264,10 @@ def test_the_summary_is_short_whatever_came_out():
     found = summary(made)
     more = (*(Finding("mode", "mode", "more") for _ in range(9)), *found.findings)
     for each in (found, replace(found, findings=more)):
-        assert len(each.lines) <= MOST_LINES
+        assert len(each.rows) <= MOST_ROWS
+        assert MOST_COLUMNS / 2 < max(map(len, each.lines)) <= MOST_COLUMNS
         assert all(line.isprintable() and line.isascii() for line in each.lines)
-        assert each.lines[-1].startswith("certainty")
+        assert each.rows[-1][0] == "certainty"
 
 
 def test_a_summary_read_some_points_at_a_time_is_the_same(monkeypatch):
@@ -300,12 +324,6 @@ def test_depths_and_motions_that_no_model_has_are_asked_about(depth, motion, out
     doubts = [text for label, text in summary(made).rows if label == "beware"]
     assert len(doubts) == n_doubts
     assert all("211.25 Hz" in doubt for doubt in doubts)
-
-
-@pytest.mark.parametrize(("frequencies", "asked"), [("[150, 160]", True), ("[20, 25]", False), ("[400, 500]", False)])
-def test_frequencies_in_radians_are_asked_about(frequencies, asked):
-    made = wearing(f"axes.frequency={frequencies}").assign(stuck_frequency=25.0)
-    assert any("rad/s" in line for line in summary(made).lines) is asked
 
 
 # --- errors in percent ---

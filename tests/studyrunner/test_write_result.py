@@ -79,7 +79,7 @@ CONTRACT = {
         (("cycle", "response"), "m", "response_amplitude response_mean response_peak"),
         (("cycle", "response"), "rad", "response_phase"),
         (("cycle",), "1", "residual penetration tension cone_violation energy_error response_error wear_rate_error"),
-        (("cycle",), "1", "worn_volume_error harmonics_used samples_used"),
+        (("cycle",), "1", "worn_volume_error harmonics_used samples_used friction_use"),
         ((), "1", "cycles_to_target cycles_to_target_error"),
         ((), "1", "outcome jump_cycle newton_iterations error_estimate branch"),
         ((), "1", "last_cycle step_limit message"),

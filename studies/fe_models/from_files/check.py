@@ -244,7 +244,9 @@ def _draw_surface(
         axes.quiver(*position.T, *pairs.frames[own, direction].T, length=length, color=colour, linewidth=0.8)
     for number in own[:_MOST_NUMBERS]:
         axes.text(*pairs.position[number], str(number), fontsize=7)
-    axes.set(xlabel="x, m", ylabel="y, m", zlabel="z, m")
+    for name in "xyz":
+        # beside the numbers of the ticks
+        getattr(axes, f"set_{name}label")(f"{name}, m", labelpad=9.0)
     axes.set_title(f"{moving} on {opposite}: {len(own)} pairs")
     # a cube: one scale for all directions
     middle = (position.min(axis=0) + position.max(axis=0)) / 2.0

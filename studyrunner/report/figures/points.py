@@ -123,8 +123,11 @@ def _draw_trend(panel: Axes, result: Result, name: str, values: FloatArray, erro
     elif words or len(ticks) <= 3:
         texts = [str(each) if words else show_number(float(each), 4) for each in ticks]
         turned: dict[str, Any] = {"rotation": 35, "ha": "right", "rotation_mode": "anchor"}
-        where = np.arange(len(ticks)) if words else ticks
-        panel.set_xticks(where, texts, **(turned if sum(map(len, texts)) > _LONG else {}))
+        is_long, where = sum(map(len, texts)) > _LONG, np.arange(len(ticks)) if words else ticks
+        if is_long and not words:
+            # what lies between two numbers needs none
+            texts[1:-1] = [""] * len(texts[1:-1])
+        panel.set_xticks(where, texts, **(turned if is_long and words else {}))
         panel.margins(x=0.15)
     else:
         panel.locator_params(axis="x", nbins=3)
@@ -221,14 +224,19 @@ def draw_exceedance(result: Result) -> Drawn:
         for number, (label, point) in enumerate(zip(labels, shown, strict=True)):
             at, style = scale(point[dimension].values), plot.line_style(number)
             value, interval = (_ends(point, f"{name}{each}", dimension) for each in ("", "_interval"))
-            panel.fill_between(at, *interval.T, color=style["color"], alpha=0.18, lw=0.0)
+            if len(shown) == 1:
+                panel.fill_between(at, *interval.T, color=style["color"], alpha=0.18, lw=0.0)
+            else:
+                # bands on top of each other would be mud
+                panel.plot(at, interval, color=style["color"], linestyle=":", lw=0.8, label="_interval")
             for bound in (_LOWEST, _HIGHEST) if (np.ptp(value, axis=1) > 0.0).any() else (_LOWEST,):
                 look = {name: style[name] for name in ("color", "linestyle")}
                 panel.plot(at, value[:, bound], **look, label="_" if bound else label or "samples")
         panel.set(xlabel=scale.label(words), ylabel="probability of more", ylim=(0.0, 1.02))
         panel.set_xlim(0.0, scale(last[dimension].values[-1]).item())
     plot.label_outer(panels)
-    return figure, _n_samples(last), left_out
+    ends = "Thin dotted: ends of the intervals" if len(shown) > 1 else "Band: interval"
+    return figure, f"{ends}; {_n_samples(last)}", left_out
 
 
 def draw_deciding_inputs(result: Result) -> Drawn:

@@ -71,6 +71,8 @@ def draw_responses(result: Result) -> Drawn:
             plot.add_line(panel, line.at, values, error, label=line.label, **line.look)
         if line.look is not _EXACT and np.isfinite(first).any():
             top = int(np.nanargmax(first))
+            marks: dict[str, Any] = {"marker": "o", "ms": 8, "mfc": "none", "zorder": 4, "label": "_peak"}
+            panels[0, 0].plot(line.at[top], scale(first[top]), color=line.look["color"], **marks)
             peaks.append(labelled(f"{scale.show(float(first[top]))} at {line.at[top]:.6g} Hz", line.label))
     for panel, name in zip(panels[:, 0], result.responses, strict=False):
         crosses = plot.mark_failed(panel, course.values, failed) if course else ""
@@ -79,9 +81,9 @@ def draw_responses(result: Result) -> Drawn:
     panels[-1, 0].set_xlabel("excitation frequency (Hz)")
     return (
         figure,
-        f"Largest amplitude of the first harmonic of {result.responses[0]}: {'; '.join(peaks)}",
-        f"One joint, {curves.attrs['title']}: its response curve at that wear, without further wear" if curves else "",
         str(curves.attrs["how"]) if curves else "",
+        f"One joint, {curves.attrs['title']}: its response curve at that wear, without further wear" if curves else "",
+        f"Points: largest amplitude of the first harmonic of {result.responses[0]}, {'; '.join(peaks)}",
         f"Without the curve of the worn joint: {result.no_worn_response}" if result.no_worn_response else "",
         "More responses are in the file" if len(result.responses) > n_panels else "",
         crosses,
