@@ -145,7 +145,7 @@ class Limits(Section):
     def rules(self) -> Iterator[Wrong]:
         """One of them is given."""
         if not self.model_dump(exclude_none=True):
-            yield Wrong("", {}, "give {wear_depth = 5e-6}, {worn_volume = 1e-9} or both, or leave it out")
+            yield Wrong("", {}, "give wear_depth, worn_volume or both, or leave it out")
 
 
 class ScatterSection(Section):
@@ -162,7 +162,7 @@ class ScatterSection(Section):
     seed: Annotated[Whole, Field(ge=0, lt=2**31)] = Field(1, description="of the random numbers")
     limits: Limits | None = Field(
         None,
-        description="whose probability is asked: {wear_depth = 5e-6}, m, of the deepest pair, {worn_volume = 1e-9}, m3",
+        description="how probable is at most {wear_depth = 5e-6}, m, of the deepest pair, or {worn_volume = 1e-9}, m3",
     )
 
     def rules(self) -> Iterator[Wrong]:

@@ -109,7 +109,7 @@ def worn_volume_statistics(
     if limits is None and section is not None:
         given = {name: limit for name, limit in section.given_limits.items() if _variable_of(dataset, name)}
     if wrong := [name for name, limit in given.items() if not (_variable_of(dataset, name) and limit > 0.0)]:
-        raise ValueError(f"Give limits above 0, of worn_volume or, in the file, wear_depth, not {wrong[0]}.")
+        raise ValueError(f"Give limits above 0 of what the file has, not {wrong[0]} = {given[wrong[0]]}.")
     asked = _Asked(quantiles, confidence, {"worn_volume": exceed, "wear_depth": depth}, given)
     about_missing = _about("1", "samples without a value to be trusted")
     found: _Arrays = {

@@ -126,11 +126,9 @@ def _scatter(study: Study) -> Iterator[Wrong]:
     # numbers with fractions
     floats = [name for name, field in fields.items() if float in (field.annotation, *get_args(field.annotation))]
     known = [*(NUMBERS if study.kind.counted else ()), *OF_PAIRS, *floats, *study.wear.numbers]
-    limits, slow_time = study.scatter and study.scatter.given_limits, study.slow_time
-    if limits and (study.kind is MODES or slow_time.until is not None or not (slow_time.missions or slow_time.cycles)):
-        remedy = (
-            "leave it out: only histories to a last count above 0, without slow_time.until, tell what stays below it"
-        )
+    limits = study.scatter and study.scatter.given_limits
+    if limits and (study.kind is MODES or study.slow_time.until is not None):
+        remedy = "leave it out: it asks for the wear after all cycles or missions, without slow_time.until"
         yield Wrong("scatter.limits", limits, remedy)
     for name, scattered in study.scatter.inputs.items() if study.scatter else ():
         several = name in NUMBERS and len(getattr(study.axes, name) or ()) > 1
