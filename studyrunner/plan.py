@@ -13,7 +13,7 @@ from studyrunner.kinds.task import TaskPlan, Work, with_tasks
 from studyrunner.scene.answers import remarks_of_study
 from studyrunner.scene.scene import SceneFacts, values_of_point
 from studyrunner.scene.scene_set import SceneSet, contact_changes, merge_facts, plan_scenes
-from studyrunner.statistics.study_statistics import what_samples_tell
+from studyrunner.statistics.sentences import what_samples_tell
 from studyrunner.study.sections import AUTO, SOLVER_AXES
 from studyrunner.study.study import MISSIONS, MODES, Study
 from studyrunner.system.progress import count, format_seconds

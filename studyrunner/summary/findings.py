@@ -16,7 +16,7 @@ from solver.outcome import SENSITIVE_ERROR, Outcome, absolute
 from studyrunner.coordinates import POINT, SAMPLE
 from studyrunner.result.pairs import contact_pairs, has_depths, last_depth
 from studyrunner.result.view import NO_MOTION, NO_VOLUME, Point, Result
-from studyrunner.statistics.study_statistics import describe_limit, describe_ranking, describe_volumes
+from studyrunner.statistics.sentences import describe_limit, describe_ranking, describe_volumes
 from studyrunner.system.progress import count
 from studyrunner.units import scale_for, show_cycles, show_known, show_number, show_percent
 

@@ -21,13 +21,8 @@ from studyrunner.statistics.samples import (
     saltelli_indices,
     two_groups,
 )
-from studyrunner.statistics.study_statistics import (
-    describe_limit,
-    describe_ranking,
-    describe_volumes,
-    what_samples_tell,
-    worn_volume_statistics,
-)
+from studyrunner.statistics.sentences import describe_limit, describe_ranking, describe_volumes, what_samples_tell
+from studyrunner.statistics.study_statistics import worn_volume_statistics
 from tests.studyrunner.results import SCATTER, sample_file
 
 # Archard: V = k_w P s N, with lognormal k_w, P, s

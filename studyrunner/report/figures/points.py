@@ -18,7 +18,7 @@ from studyrunner.report.drawing import COLOURS, Drawn, FloatArray, Table, as_sen
 from studyrunner.report.selection import choose, find_course, slow_time, spans_decades
 from studyrunner.result.opening import describe_outcome
 from studyrunner.result.view import NO_VOLUME, Result
-from studyrunner.statistics.study_statistics import describe_ranking, measure_of
+from studyrunner.statistics.sentences import describe_ranking, measure_of
 from studyrunner.system.progress import count
 from studyrunner.units import Scale, scale_for, show_cycles, show_known, show_number, units_of
 from studyrunner.variables import CERTIFICATE
