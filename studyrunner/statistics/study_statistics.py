@@ -14,7 +14,6 @@ from studyrunner.scatter import ScatterSection
 from studyrunner.statistics import samples
 from studyrunner.statistics.samples import CYCLE, DRAWN, Array, SampleValues
 
-
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)  # of the bands that figures show
 CONFIDENCE = 0.95
 _N_THRESHOLDS, _N_DENSITY = 41, 101
