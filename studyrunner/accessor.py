@@ -4,7 +4,7 @@ Importing this module gives every `xarray.Dataset` read from a result file the a
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -69,9 +69,10 @@ class FretwearAccessor:
         confidence: float = 0.95,
         exceed: Sequence[float] | None = None,
         depth: Sequence[float] | None = None,
+        limits: Mapping[str, float] | None = None,
     ) -> xr.Dataset:
         """`studyrunner.statistics.study_statistics.worn_volume_statistics` of this dataset. ValueError: no samples."""
-        return worn_volume_statistics(self._dataset, quantiles, confidence, exceed, depth)
+        return worn_volume_statistics(self._dataset, quantiles, confidence, exceed, depth, limits)
 
     def flank(self, name: str, surface: str) -> xr.DataArray:
         """Variable `name` of the pairs of one surface, on the grid in which they lie.

@@ -13,6 +13,7 @@ from studyrunner.kinds.task import TaskPlan, Work, with_tasks
 from studyrunner.scene.answers import remarks_of_study
 from studyrunner.scene.scene import SceneFacts, farthest_from_default, values_of_point
 from studyrunner.scene.scene_set import SceneSet, merge_facts, plan_scenes
+from studyrunner.statistics.sentences import what_samples_tell
 from studyrunner.study.sections import AUTO, SOLVER_AXES
 from studyrunner.study.study import MISSIONS, MODES, Study
 from studyrunner.system.progress import count, format_seconds
@@ -104,6 +105,8 @@ def _of_study(
         pairs = f"{fewest} to " * (fewest < n_contact) + count(n_contact, "contact pair")
         yield "scenes", f"{len(of_scenes)}, built once each, with {pairs}"
     yield "points", f"{plan.n_points}" + (f" = {shape}" if shape else "")
+    if study.scatter is not None:
+        yield "samples", what_samples_tell(study.scatter)
     if study.follow is not None:
         what = f"{study.follow.of}, found between {study.follow.low:g} and {study.follow.high:g} Hz by the sweep"
         yield "frequency", what if study.output_counts[-1] == 0.0 else f"{what} and followed while the joint wears"
@@ -152,6 +155,7 @@ def doubts_of_study(study: Study, facts: SceneFacts | None = None) -> tuple[str,
     """
     parts = [part for variant in study.variants or (study,) for part in (variant, *variant.block_studies)]
     table, until = study.wear.as_law.table, study.slow_time.until or {}
+    limits = study.scatter.given_limits if study.scatter else {}
     factors = [1.0] if table is None else [factor for row in table.factor for factor in row]
     wear = [value * factor for value in study.axes.wear_coefficient for factor in factors]
     of_wear = "wear_coefficient" if table is None else "wear_coefficient times wear.factor"
@@ -170,6 +174,8 @@ def doubts_of_study(study: Study, facts: SceneFacts | None = None) -> tuple[str,
         _question("slow_time.cycles", [study.slow_time.cycles], ("", 0.0, 1e13, {}), "more than machines live"),
         _question("slow_time.until.wear_depth", [until.get("wear_depth", 0.0)], depth, deep),
         _question("slow_time.until.worn_volume", [until.get("worn_volume", 0.0)], volume, "more than joints lose"),
+        _question("scatter.limits.wear_depth", [limits.get("wear_depth", 0.0)], depth, deep),
+        _question("scatter.limits.worn_volume", [limits.get("worn_volume", 0.0)], volume, "more than joints lose"),
         _question("slow_time.largest_depth", [study.slow_time.largest_depth or 0.0], depth, deep),
         _question("scene.worn", worn, depth, deep),
         _question("gap", gap, ("m", 0.0, 1.0, lengths), "wider than joints are"),

@@ -136,8 +136,20 @@ class Scattered(Section):
         return next(each for each in (self.normal, self.lognormal, self.uniform) if each is not None)
 
 
+class Limits(Section):
+    """What a design allows, of the values of samples after all cycles and before."""
+
+    wear_depth: Positive | None = None
+    worn_volume: Positive | None = None
+
+    def rules(self) -> Iterator[Wrong]:
+        """One of them is given."""
+        if not self.model_dump(exclude_none=True):
+            yield Wrong("", {}, "give wear_depth, worn_volume or both, or leave it out")
+
+
 class ScatterSection(Section):
-    """[scatter]: samples, method, seed; every other key names an input that scatters."""
+    """[scatter]: samples, method, seed, limits; every other key names an input that scatters."""
 
     model_config = ConfigDict(extra="allow")
     __pydantic_extra__: dict[str, Scattered]
@@ -148,6 +160,10 @@ class ScatterSection(Section):
     )
     method: Method = Field("sobol", description="how the samples are chosen")
     seed: Annotated[Whole, Field(ge=0, lt=2**31)] = Field(1, description="of the random numbers")
+    limits: Limits | None = Field(
+        None,
+        description="how probable is at most {wear_depth = 5e-6}, m, of the deepest pair, or {worn_volume = 1e-9}, m3",
+    )
 
     def rules(self) -> Iterator[Wrong]:
         """Something scatters, pair by pair only what belongs to pairs, and the method has the samples it needs."""
@@ -179,6 +195,11 @@ class ScatterSection(Section):
     def rows_a_sample(self) -> int:
         """Rows of the design for each of `samples`: A, B, and A with one input from B after the other (Saltelli)."""
         return 2 + len(self.inputs) if self.method == "saltelli" else 1
+
+    @property
+    def given_limits(self) -> dict[str, float]:
+        """The limits by name."""
+        return {} if self.limits is None else self.limits.model_dump(exclude_none=True)
 
     @property
     def n_rows(self) -> int:

@@ -27,8 +27,7 @@ CAPTIONS = {
     "block_responses": f"Amplitude of the first harmonic in the mission that ends at the number. {_BANDS}",
     "natural_frequency": _BARS,
     "damping_ratio": _BARS,
-    "worn_volume_bands": _QUANTILES,
-    "worn_volume_bands_course": _QUANTILES,
+    **{f"{name}_bands{over}": _QUANTILES for name in ("worn_volume", "wear_depth") for over in ("", "_course")},
     "exceedance": "Probability that more is worn than a volume, and that a pair is worn deeper than a depth. Where two"
     " lines are alike, samples without a value leave open what is between them",
     "deciding_inputs": "Share of the variance (Sobol' indices), or rank correlation: 1 or -1 where the volume rises or"
@@ -120,8 +119,11 @@ FIGURES = (
     Entry("block_responses", "Vibration of each block over the missions", wear.draw_blocks, wear.RESPONSES, **_BLOCK),
     _mode(response.draw_mode, "natural_frequency", "Natural frequency of a mode over its amplitude"),
     _mode(response.draw_mode, "damping_ratio", "Damping ratio of a mode over its amplitude"),
-    Entry("worn_volume_bands", "Worn volume of the samples over {slow}", points.draw_bands, "cycle"),
-    Entry("worn_volume_bands_course", "Worn volume of the samples over {over}", points.draw_bands, "course"),
+    *(
+        Entry(f"{name}_bands{end}", f"{words} of the samples over {over}", points.draw_bands, (name, way))
+        for name, words in (("worn_volume", "Worn volume"), ("wear_depth", "Deepest wear"))
+        for end, over, way in (("", "{slow}", "cycle"), ("_course", "{over}", "course"))
+    ),
     Entry("exceedance", "Probability of more wear", points.draw_exceedance),
     Entry("deciding_inputs", "What decides the worn volume", points.draw_deciding_inputs),
     Entry("worn_volume", "Worn volume over {slow}", wear.draw_history, needs=_WORN, at="course"),

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 import scipy  # whose parts are loaded at their first use
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
 CYCLE = "cycle"
@@ -110,16 +110,30 @@ def quantiles(values: SampleValues, probabilities: Sequence[float], confidence: 
 
 
 def exceedance(values: SampleValues, thresholds: Array, confidence: float) -> tuple[Array, Array]:
-    """Probabilities (..., d) of values above d thresholds, with the intervals of Clopper and Pearson (1934)."""
-    n, tail = values.low.shape[-1], 0.5 * (1.0 - confidence)
+    """Probabilities (..., d) of values above d thresholds, with the intervals of `probability_interval`."""
+    n = values.low.shape[-1]
 
     def estimate(y: Array) -> tuple[Array, Array, Array]:
-        above = np.stack([(y > each).sum(axis=-1) for each in thresholds], axis=-1).astype(np.float64)
-        low = np.where(above > 0, scipy.stats.beta.ppf(tail, np.maximum(above, 1), n - above + 1), 0.0)
-        high = np.where(above < n, scipy.stats.beta.ppf(1.0 - tail, above + 1, np.maximum(n - above, 1)), 1.0)
-        return above / n, low, high
+        above = np.stack([(y > each).sum(axis=-1) for each in thresholds], axis=-1)
+        return above / n, *probability_interval(above, n, confidence)
 
     return band_of(estimate, values)
+
+
+def probability_interval(found: ArrayLike, n: int, confidence: float) -> tuple[Array, Array]:
+    """Ends of the intervals of Clopper and Pearson (1934) of the probability of what is found so often in n samples."""
+    of, tail = np.asarray(found, dtype=np.float64), 0.5 * (1.0 - confidence)
+    low = np.where(of > 0, scipy.stats.beta.ppf(tail, np.maximum(of, 1), n - of + 1), 0.0)
+    return low, np.where(of < n, scipy.stats.beta.ppf(1.0 - tail, of + 1, np.maximum(n - of, 1)), 1.0)
+
+
+def below(values: SampleValues, limit: float, confidence: float) -> tuple[Array, Array, NDArray[np.int_]]:
+    """Probability (..., 2) of values up to a limit, its interval (..., 2), and the number (...) of samples of which
+    value and error, or its bounds, lie on both sides: these count as below and as above.
+    """
+    own = values.widened()
+    band, interval = (1.0 - each[..., 0, ::-1] for each in exceedance(own, np.array([limit]), confidence))
+    return band, interval, ((own.low <= limit) & (own.high > limit)).sum(axis=-1)
 
 
 def rank_correlations(inputs: Array, values: SampleValues, confidence: float) -> tuple[Array, Array]:

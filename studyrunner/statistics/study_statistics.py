@@ -1,10 +1,9 @@
-"""The statistics of a result with samples, as a labelled dataset and in sentences."""
+"""The statistics of a result with samples, as a labelled dataset."""
 
-import math
 import tomllib
-from collections.abc import Sequence
-from dataclasses import replace
-from typing import Any
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
@@ -13,19 +12,43 @@ from numpy.typing import ArrayLike
 from studyrunner.coordinates import SAMPLE
 from studyrunner.scatter import ScatterSection
 from studyrunner.statistics import samples
-from studyrunner.statistics.samples import CYCLE, DRAWN, FEWEST, Array, SampleValues
-from studyrunner.units import show_percent
+from studyrunner.statistics.samples import CYCLE, DRAWN, Array, SampleValues
 
-_QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)  # of the bands that figures show
+QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)  # of the bands that figures show
+CONFIDENCE = 0.95
 _N_THRESHOLDS, _N_DENSITY = 41, 101
 _MOST_VALUES, _MOST_OF_ALL = 10**6, 10**7
 """Worn volumes of a file from which on only some of the cycle counts are used, and none: a million take some 30 s."""
 
-_MM3 = 1e9
-_MEASURES = ("first_index", "rank_correlation")
 
 _Arrays = dict[str, tuple[tuple[str, ...], Any, dict[str, str]]]
 """For each name dimensions, values and attributes, as xarray takes them."""
+
+
+class _Quantity(NamedTuple):
+    """What samples are asked about. variables: of a result that hold it. factor, shown: unit for a reader."""
+
+    words: str
+    units: str
+    variables: tuple[str, ...]
+    factor: float
+    shown: str
+
+
+QUANTITIES = {
+    "worn_volume": _Quantity("worn volume", "m3", ("worn_volume",), 1e9, "mm3"),
+    "wear_depth": _Quantity("wear depth of the deepest pair", "m", ("wear_depth", "wear_depth_max"), 1e6, "um"),
+}
+
+
+@dataclass(frozen=True)
+class _Asked:
+    """Arguments of `worn_volume_statistics`. thresholds, limits: by quantity; of a limit only those that are given."""
+
+    quantiles: Sequence[float]
+    confidence: float
+    thresholds: Mapping[str, ArrayLike | None]
+    limits: Mapping[str, float]
 
 
 def worn_volume_statistics(
@@ -34,6 +57,7 @@ def worn_volume_statistics(
     confidence: float = 0.95,
     exceed: ArrayLike | None = None,
     depth: ArrayLike | None = None,
+    limits: Mapping[str, float] | None = None,
 ) -> xr.Dataset:
     """What the samples of a result say of worn volume and depth, over all its other dimensions.
 
@@ -43,14 +67,19 @@ def worn_volume_statistics(
 
     dataset: with the dimension `sample`, drawn values as coordinates `sample_NAME`, and `worn_volume`. quantiles:
     probabilities, ascending. confidence: of the intervals. exceed, depth: worn volumes, m3, and depths, m, for the
-    probabilities of exceedance; by default 41 up to the largest.
+    probabilities of exceedance; by default 41 up to the largest. limits: of worn_volume, m3, and wear_depth, m, above
+    0; by default those of the study.
 
-    Returns worn_volume_quantile (m3), worn_volume_exceedance, wear_depth_exceedance, and of each input first_index and
-    total_index (1) with saltelli, else rank_correlation (1), each with _interval; worn_volume_quantile_error (m3), the
-    ends with every value less or more its numerical error; n_samples, n_without_value; of the last count
-    worn_volume_density (1/m3) over worn_volume_grid (m3), group_size (2), group_gap (m3, two ends; NaN for one group),
-    deciding_contact (-1: none). Raises ValueError where the result has no samples or no worn volume, or a probability
-    is not between 0 and 1.
+    Returns worn_volume_quantile (m3), worn_volume_exceedance, and of each input first_index and total_index (1) with
+    saltelli, else rank_correlation (1), each with _interval; worn_volume_quantile_error (m3), the ends with every value
+    less or more its numerical error. With a limit: worn_volume_limit (m3); worn_volume_below_limit, the probability up
+    to it, with _interval; worn_volume_not_placed: samples that are not known to be on one side, with numerical errors,
+    which count as above in the lowest and as below in the highest probability. The same of wear_depth (m), of the
+    deepest pair, where the file has it. n_samples, n_without_value; of the last count worn_volume_density (1/m3) over
+    worn_volume_grid (m3), group_size (2), group_gap (m3, two ends; NaN for one group), deciding_contact (-1: none).
+
+    Raises ValueError where the result has no samples or no worn volume, a probability is not between 0 and 1, or a
+    limit is not above 0 or of what the file does not have.
     """
     for name in ("worn_volume", "outcome"):
         if name not in dataset or SAMPLE not in dataset[name].dims:
@@ -60,7 +89,8 @@ def worn_volume_statistics(
     if "mission" in dataset.dims:
         # missions count slow time in place of cycles
         in_cycles = dataset.drop_dims("block", errors="ignore").rename(mission=CYCLE)
-        return worn_volume_statistics(in_cycles, quantiles, confidence, exceed, depth).rename({CYCLE: "mission"})
+        counted = worn_volume_statistics(in_cycles, quantiles, confidence, exceed, depth, limits)
+        return counted.rename({CYCLE: "mission"})
     if "cycle_count" in dataset:
         # each point has counts of its own: they share the last one only
         dataset = dataset.isel({CYCLE: [-1]})
@@ -71,7 +101,24 @@ def worn_volume_statistics(
         rows = rows[rows % section.rows_a_sample < 2]
     everything, names = _read_samples(dataset, "worn_volume")
     values = everything.at((..., rows))
-    found, coords = _of_values(dataset, values, rows, names, quantiles, confidence, (exceed, depth))
+    given = {} if limits is None else limits
+    if limits is None and section is not None:
+        given = {name: limit for name, limit in section.given_limits.items() if _variable_of(dataset, name)}
+    if wrong := [name for name, limit in given.items() if not (_variable_of(dataset, name) and limit > 0.0)]:
+        raise ValueError(f"Give limits above 0 of what the file has, not {wrong[0]} = {given[wrong[0]]}.")
+    asked = _Asked(quantiles, confidence, {"worn_volume": exceed, "wear_depth": depth}, given)
+    about_missing = _about("1", "samples without a value to be trusted")
+    found: _Arrays = {
+        "n_samples": ((), np.int32(len(rows)), _about("1", "samples")),
+        "n_without_value": (names, (~values.is_known).sum(axis=-1), about_missing),
+    }
+    coords: dict[str, Any] = {"bound": ["lowest", "highest"]}
+    coords["quantile"] = ("quantile", np.asarray(quantiles), _about("1", "probability"))
+    for name in QUANTITIES:
+        if variable := _variable_of(dataset, name):
+            whole, own_names = _read_samples(dataset, variable)
+            of_values, of_coords = _of_values(name, whole.at((..., rows)), own_names, asked)
+            found, coords = found | of_values, coords | of_coords
     order = sorted(str(name).removeprefix(DRAWN) for name in dataset.coords if str(name).startswith(DRAWN))
     if inputs := [*section.inputs] if section is not None else order:
         found |= _of_inputs(dataset, inputs, everything, confidence, names, is_saltelli=is_saltelli)
@@ -91,7 +138,7 @@ def statistics_of_file(dataset: xr.Dataset) -> xr.Dataset | None:
         return None
     kept = min(counts, max(2, _MOST_VALUES // per_count))
     places = np.unique(np.linspace(0, counts - 1, kept).astype(int))
-    return worn_volume_statistics(dataset.isel({CYCLE: places}), _QUANTILES)
+    return worn_volume_statistics(dataset.isel({CYCLE: places}), QUANTILES, CONFIDENCE)
 
 
 def _scatter_of(dataset: xr.Dataset) -> ScatterSection | None:
@@ -148,41 +195,34 @@ def _bands(name: str, long_name: str, units: str, band: tuple[Array, Array], dim
     }
 
 
+def _variable_of(dataset: xr.Dataset, name: str) -> str | None:
+    """The variable of a result with a quantity; None where it has none."""
+    of = QUANTITIES[name].variables if name in QUANTITIES else ()
+    return next((each for each in of if each in dataset), None)
+
+
 def _of_values(
-    dataset: xr.Dataset,
-    values: SampleValues,
-    rows: np.ndarray,
-    names: tuple[str, ...],
-    probabilities: Sequence[float],
-    confidence: float,
-    thresholds: tuple[ArrayLike | None, ArrayLike | None],
+    name: str, values: SampleValues, names: tuple[str, ...], asked: _Asked
 ) -> tuple[_Arrays, dict[str, Any]]:
-    """Quantiles of worn volumes, probabilities of larger volumes and depths, and their coordinates."""
-    coords: dict[str, Any] = {"bound": ["lowest", "highest"]}
-    coords["quantile"] = ("quantile", np.asarray(probabilities), _about("1", "probability"))
-    band = samples.quantiles(values, probabilities, confidence)
-    found = _bands("worn_volume_quantile", "quantile of worn volume", "m3", band, (*names, "quantile"))
-    moved = np.maximum(samples.quantiles(values.widened(), probabilities, confidence)[0], 0.0)
-    about_error = _about("m3", "quantile of worn volume, with numerical error")
-    found["worn_volume_quantile_error"] = ((*names, "quantile", "bound"), moved, about_error)
-    found["n_samples"] = ((), np.int32(len(rows)), _about("1", "samples"))
-    n_without = (~values.is_known).sum(axis=-1)
-    found["n_without_value"] = (names, n_without, _about("1", "samples without a value to be trusted"))
-    of_depth = next((name for name in ("wear_depth", "wear_depth_max") if name in dataset), None)
-    for variable, quantity, units, given, words in (
-        ("worn_volume", "volume", "m3", thresholds[0], "probability of a larger worn volume"),
-        (of_depth, "depth", "m", thresholds[1], "probability that a pair is worn deeper before this count"),
-    ):
-        if variable is not None:
-            whole, own_names = _read_samples(dataset, variable)
-            own = whole.at((..., rows))
-            even = np.linspace(0.0, float(own.low.max()) or 1.0, _N_THRESHOLDS)
-            above = even if given is None else np.sort(np.atleast_1d(np.asarray(given, dtype=np.float64)))
-            name, shown = variable.removesuffix("_max"), f"exceeded_{quantity}"
-            band = samples.exceedance(own, above, confidence)
-            found |= _bands(f"{name}_exceedance", words, "1", band, (*own_names, shown))
-            coords[shown] = (shown, above, _about(units, name.replace("_", " ")))
-    return found, coords
+    """Quantiles of a quantity, also with numerical errors, probabilities of more and up to its limit; coordinates."""
+    words, units, dims, confidence = *QUANTITIES[name][:2], (*names, "quantile"), asked.confidence
+    band = samples.quantiles(values, asked.quantiles, confidence)
+    found = _bands(f"{name}_quantile", f"quantile of the {words}", units, band, dims)
+    moved = np.maximum(samples.quantiles(values.widened(), asked.quantiles, confidence)[0], 0.0)
+    about_error = _about(units, f"quantile of the {words}, with numerical error")
+    found[f"{name}_quantile_error"] = ((*dims, "bound"), moved, about_error)
+    given, shown = asked.thresholds[name], f"exceeded_{name.split('_')[1]}"
+    even = np.linspace(0.0, float(values.low.max()) or 1.0, _N_THRESHOLDS)
+    above = even if given is None else np.sort(np.atleast_1d(np.asarray(given, dtype=np.float64)))
+    band = samples.exceedance(values, above, confidence)
+    found |= _bands(f"{name}_exceedance", f"probability of a larger {words}", "1", band, (*names, shown))
+    if (limit := asked.limits.get(name)) is not None:
+        *each, n_unknown = samples.below(values, limit, confidence)
+        found |= _bands(f"{name}_below_limit", f"probability up to the limit, {words}", "1", (each[0], each[1]), names)
+        found[f"{name}_limit"] = ((), limit, _about(units, f"limit of the {words}"))
+        about_unknown = _about("1", "samples not known to be on one side of the limit")
+        found[f"{name}_not_placed"] = (names, n_unknown, about_unknown)
+    return found, {shown: (shown, above, _about(units, words))}
 
 
 def _of_inputs(
@@ -242,67 +282,3 @@ def _of_groups(dataset: xr.Dataset, values: SampleValues, names: tuple[str, ...]
         "group_gap": ((*axes, "group"), gap, _about("m3", "ends of the gap between two groups")),
         "deciding_contact": (axes, contact, _about("1", "contact pair that separates the groups best, -1: none")),
     }
-
-
-# --- in sentences ---
-
-
-def describe_volumes(point: xr.Dataset) -> str:
-    """Range, median and numerical error of the worn volumes of one point, and two groups where there are."""
-    ends, error = (point[name].values * _MM3 for name in ("worn_volume_quantile", "worn_volume_quantile_error"))
-    probabilities, n_without = point["quantile"].values, int(point["n_without_value"])
-    share = 100.0 * (probabilities[-1] - probabilities[0])
-    text = f"{share:.4g} % of {int(point['n_samples'])} samples wear {_range(ends[0, 0], ends[-1, 1])} mm3"
-    for middle, moved in zip(ends[probabilities == 0.5], error[probabilities == 0.5], strict=True):
-        # how far the ends move, apart from what samples without a value may have
-        finite = np.isfinite(middle)
-        by = np.abs(moved - middle)[finite]
-        relative = float(by.sum() / middle[finite].sum()) if by.any() else 0.0
-        shown = show_percent(relative) if finite.any() and math.isfinite(relative) else "not known"
-        text += f", median {_range(*middle)} mm3 (numerical error {shown})"
-    text += f"; {n_without} have no volume that can be trusted" if n_without else ""
-    (n_lower, n_upper), (lower, upper) = point["group_size"].values.tolist(), point["group_gap"].values * _MM3
-    if n_upper:
-        text += f"; two groups, {n_lower} samples up to {lower:.3g} mm3 and {n_upper} from {upper:.3g} mm3"
-        contact = int(point["deciding_contact"])
-        text += "" if contact < 0 else f", which differ in the wear depth of contact pair {contact}"
-    return text
-
-
-def _range(low: float, high: float, digits: str = ".3g") -> str:
-    first, last = f"{low:{digits}}", f"{high:{digits}}"
-    return f"above {first}" if math.isinf(high) else first if first == last else f"{first} to {last}"
-
-
-def measure_of(statistics: xr.Dataset) -> str | None:
-    """Name of the statistic by which the inputs are ranked; None where there is none."""
-    return next((name for name in _MEASURES if name in statistics), None)
-
-
-def describe_ranking(point: xr.Dataset) -> str:
-    """The deciding input in words, or why none is known; "" where no input varies.
-
-    One decides where the interval of its strength, a correlation without sign, is above those of all others.
-    """
-    name = measure_of(point)
-    if name is None:
-        return ""
-    n_samples, words = int(point["n_samples"]), [str(each).replace("_", " ") for each in point["input"].values]
-    values, intervals = (point[f"{name}{each}"].transpose("input", "bound").values for each in ("", "_interval"))
-    if np.isnan(values).all():
-        # two independent samples for each base sample
-        too_few = n_samples < FEWEST * (2 if name == "first_index" else 1)
-        return f"{n_samples} samples are too few to say which input decides" if too_few else ""
-    without = ", ".join(word for word, row in zip(words, values, strict=True) if np.isnan(row).all())
-    more = f"; not ranked: {without}" if without else ""
-    most = int(np.argmax(np.abs(np.nan_to_num(values)).max(axis=1)))
-    (low, high), (lowest, highest) = intervals[most], values[most].tolist()
-    if name == "first_index":
-        share = _range(100.0 * lowest, 100.0 * highest, ".0f")
-        shown = f"{share} % of the variance, interval {100.0 * low:.0f} to {100.0 * high:.0f} %"
-    else:
-        shown = f"rank correlation {_range(lowest, highest, '.2f')}, interval {low:.2f} to {high:.2f}"
-    others = np.abs(np.nan_to_num(np.delete(intervals, most, axis=0))).max(initial=0.0)
-    if low < 0.0 < high or min(abs(low), abs(high)) <= others:
-        return f"which input decides is not known: {words[most]} has the largest estimate ({shown}){more}"
-    return f"{words[most]} decides most ({shown}){more}"

@@ -126,6 +126,10 @@ def _scatter(study: Study) -> Iterator[Wrong]:
     # numbers with fractions
     floats = [name for name, field in fields.items() if float in (field.annotation, *get_args(field.annotation))]
     known = [*(NUMBERS if study.kind.counted else ()), *OF_PAIRS, *floats, *study.wear.numbers]
+    limits = study.scatter and study.scatter.given_limits
+    if limits and (study.kind is MODES or study.slow_time.until is not None):
+        remedy = "leave it out: it asks for the wear after all cycles or missions, without slow_time.until"
+        yield Wrong("scatter.limits", limits, remedy)
     for name, scattered in study.scatter.inputs.items() if study.scatter else ():
         several = name in NUMBERS and len(getattr(study.axes, name) or ()) > 1
         giving = any(block.gives(name) for block in study.mission)

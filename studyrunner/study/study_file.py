@@ -212,6 +212,8 @@ def _complete(study: Study) -> Study:
         names |= {*(kind.usual if study.scatter is None else kind.of_samples)}
         names |= {*(FOLLOWED_FREQUENCY if study.loading is not None else ())}
         names |= {"mesh"} & {*study.scene.offers}
+    if study.scatter is not None and study.scatter.given_limits:
+        names |= {"worn_volume", "worn_volume_error", "wear_depth_max", "wear_depth_max_error"}
     outputs = study.outputs.model_copy(
         update={"variables": tuple(name for name in sections.VARIABLES if name in names)}
     )

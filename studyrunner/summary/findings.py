@@ -16,7 +16,7 @@ from solver.outcome import SENSITIVE_ERROR, Outcome, absolute
 from studyrunner.coordinates import POINT, SAMPLE
 from studyrunner.result.pairs import contact_pairs, has_depths, last_depth
 from studyrunner.result.view import NO_MOTION, NO_VOLUME, Point, Result
-from studyrunner.statistics.study_statistics import describe_ranking, describe_volumes
+from studyrunner.statistics.sentences import describe_limit, describe_ranking, describe_volumes
 from studyrunner.system.progress import count
 from studyrunner.units import scale_for, show_cycles, show_known, show_number, show_percent
 
@@ -89,6 +89,7 @@ def _wear_and_response(result: Result, stuck: float) -> Iterator[Finding]:
         yield from _of_wear(result, point) if wears else [_nothing(result, resonance)]
     elif result.wears and result.has("worn_volume", "error_estimate") and result.computed.any():
         yield Finding("wear", "wear", "no worn volume is known within 50 %")
+    yield from _of_limits(result)
     if result.blocks is None and result.has("response_amplitude") and result.computed[result.place(point)]:
         yield _response(result, point, wears, resonance)
 
@@ -125,12 +126,35 @@ def _of_samples(result: Result) -> tuple[str, str]:
         return "", ""
     last = result.statistics.isel(cycle=-1, missing_dims="ignore")
     medians = last["worn_volume_quantile"].sel(quantile=0.5).isel(bound=0)
-    place = np.unravel_index(int(np.argmax(medians.values)), medians.shape)
-    point = dict(zip(map(str, medians.dims), map(int, place), strict=True))
+    there, where = _chosen(result, last, int(np.argmax(medians.values)), "with the largest median")
+    return f"{describe_volumes(there)} after {result.cycle_label(-1)}{where}", describe_ranking(there)
+
+
+def _of_limits(result: Result) -> Iterator[Finding]:
+    """The probability of each limit, where it is least."""
+    last = xr.Dataset() if result.statistics is None else result.statistics.isel(cycle=-1, missing_dims="ignore")
+    texts, values = list[str](), dict[str, Any]()
+    for name in ("wear_depth", "worn_volume"):
+        if f"{name}_limit" in last:
+            least = int(np.argmin(last[f"{name}_below_limit_interval"].isel(bound=0).values))
+            there, where = _chosen(result, last, least, "that is least probable")
+            texts.append(describe_limit(there, name) + where)
+            parts = {"limit": "limit", "probability": "below_limit", "interval": "below_limit_interval"}
+            values[name] = {key: there[f"{name}_{each}"].values.tolist() for key, each in parts.items()}
+            values[name]["n_unknown"] = int(there[f"{name}_not_placed"])
+    if texts:
+        yield Finding("limits", "limits", f"after {result.cycle_label(-1)}: {'; '.join(texts)}", values)
+
+
+def _chosen(result: Result, last: xr.Dataset, flat: int, why: str) -> tuple[xr.Dataset, str]:
+    """Statistics of the point of this number, and in words where it is. why: it is chosen."""
+    sizes = last["n_without_value"].sizes
+    place = np.unravel_index(flat, tuple(sizes.values()))
+    point = dict(zip(map(str, sizes), map(int, place), strict=True))
     where = result.describe(point, [name for name in result.varying if name != SAMPLE])
-    more = f" (of {medians.size} points the one with the largest median)" if medians.size > 1 else ""
-    after = f" after {result.cycle_label(-1)}" + (f", at {where}" if where else "")
-    return f"{describe_volumes(last.isel(point))}{after}{more}", describe_ranking(last.isel(point))
+    n_points = last["n_without_value"].size
+    more = f" (of {n_points} points the one {why})" if n_points > 1 else ""
+    return last.isel(point), (f", at {where}" if where else "") + more
 
 
 def _deepest(result: Result, point: Point, at: int, where: str) -> Finding:

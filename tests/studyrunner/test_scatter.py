@@ -187,6 +187,18 @@ def test_pairs_that_differ_between_samples_have_the_dimension():
 
 
 @pytest.mark.slow
+def test_a_run_ends_with_the_probability_of_its_limits(capsys):
+    wear = ("scatter.wear_coefficient={lognormal={factor=2.0}}", "scatter.samples=8", "axes.excitation_amplitude=10")
+    given = (*CHEAP, *wear, "axes.scheme=adaptive", "outputs.variables=['response_amplitude']")
+    first = compute("sdof_slider", "o.nc", *given, "scatter.limits={wear_depth=1e-3}")
+    depths = np.sort(first.wear_depth_max.values[..., -1].ravel())
+    capsys.readouterr()
+    limit = f"scatter.limits={{wear_depth={0.5 * (depths[5] + depths[6])}}}"
+    compute("sdof_slider", "p.nc", *given, limit)
+    assert "6 of 8 samples" in capsys.readouterr().out
+
+
+@pytest.mark.slow
 def test_axes_and_samples_stand_side_by_side_and_the_result_is_the_study_again():
     axes = ("axes.friction_coefficient=[0.4, 0.6]", "axes.threshold=[0, 5]")
     given = (*CHEAP, "scatter.samples=2", FRICTION, WEAR, "wear.law=threshold", *axes)

@@ -5,14 +5,15 @@ import re
 import numpy as np
 import pytest
 from scipy.special import ndtri
-from scipy.stats import norm, spearmanr
+from scipy.stats import binomtest, norm, spearmanr
 from scipy.stats import t as student
 
 from solver.outcome import Outcome
-from studyrunner.scatter import unit_design
+from studyrunner.scatter import ScatterSection, unit_design
 from studyrunner.statistics.samples import (
     FEWEST,
     SampleValues,
+    below,
     deciding_pair,
     exceedance,
     quantiles,
@@ -20,7 +21,8 @@ from studyrunner.statistics.samples import (
     saltelli_indices,
     two_groups,
 )
-from studyrunner.statistics.study_statistics import describe_ranking, describe_volumes, worn_volume_statistics
+from studyrunner.statistics.sentences import describe_limit, describe_ranking, describe_volumes, what_samples_tell
+from studyrunner.statistics.study_statistics import worn_volume_statistics
 from tests.studyrunner.results import SCATTER, sample_file
 
 # Archard: V = k_w P s N, with lognormal k_w, P, s
@@ -93,6 +95,36 @@ def test_intervals_hold_the_truth_as_often_as_they_say():
     # with too few samples an end is open
     ends, interval = quantiles(known(np.arange(10.0)), [0.99], 0.95)
     assert (ends[0, 0], interval[0, 1]) == (9.0, np.inf)
+
+
+def test_the_probability_of_a_limit_has_the_samples_on_no_known_side_on_both():
+    value = np.arange(1.0, 11.0)
+    # 5 and 6 lie within their errors of the limit, one ended below it, one above
+    values = SampleValues(value, np.where(np.isin(value, [2.0, 9.0]), np.inf, value), np.where(value < 7, 0.6, 0.1))
+    band, interval, n_unknown = below(values, 5.5, 0.95)
+    np.testing.assert_allclose(band, [0.3, 0.6])
+    ends = [binomtest(k, 10).proportion_ci(0.95, "exact") for k in (3, 6)]
+    np.testing.assert_allclose(interval, [ends[0].low, ends[1].high])
+    assert n_unknown == 3
+    _, interval, n_unknown = below(known(value, np.inf), 5.5, 0.95)
+    assert (interval.tolist(), n_unknown) == ([0.0, 1.0], 10), "without a known error nothing is known"
+
+
+@pytest.mark.parametrize(
+    ("method", "n", "says"),
+    [
+        (
+            "sobol",
+            8,
+            "no ranking of inputs (from 10 on), no quantiles of 5 and 95 % (from 72 on); .* 34 %, with 64 to ± 13 %",
+        ),
+        ("random", 128, "128 by random: ranking of inputs, quantiles of 5 and 95 %; .* 9 %, with 1024"),
+        ("saltelli", 32, "32 by saltelli: ranking of inputs, no quantiles of 5 and 95 % (from 36 on); .* 13 %"),
+    ],
+)
+def test_what_samples_can_answer_is_known_before_they_are_computed(method, n, says):
+    section = ScatterSection.model_validate({"samples": n, "method": method, "mass": {"normal": {"std": 1.0}}})
+    assert re.search(says.replace("(", r"\(").replace(")", r"\)"), what_samples_tell(section))
 
 
 def test_bands_hold_what_the_missing_samples_would_have_said():
@@ -278,6 +310,22 @@ def test_samples_without_a_value_and_sensitive_ones_are_bands():
     # with more than 5 % of them there is no upper end
     part["worn_volume"][0, 8:20, 2], low[8:20] = np.nan, whole["worn_volume"][0, 8:20, 1]
     assert f"128 samples wear above {1e9 * np.sort(low)[6]:.3g} mm3" in said(worn_volume_statistics(part))
+
+
+def test_limits_are_those_of_the_study_or_given_and_samples_that_failed_are_not_known():
+    dataset = sample_file(SCATTER + "limits = {wear_depth = 4e-6}\n")
+    dataset["wear_depth_max"][0, 6, :] = np.nan
+    n_below = int((dataset["wear_depth_max"][0, :, -1] + dataset["wear_depth_max_error"][0, :, -1] <= 4e-6).sum())
+    found = worn_volume_statistics(dataset).isel(frequency=0, cycle=-1)
+    n_unknown = int(found["wear_depth_not_placed"])
+    assert f"{n_below} of 128 samples, {n_unknown} not known" in describe_limit(found, "wear_depth")
+    np.testing.assert_allclose(found["wear_depth_below_limit"], np.array([n_below, n_below + n_unknown]) / 128)
+    assert "deepest pair" in describe_volumes(found)
+    assert "worn_volume_limit" not in found
+    given = worn_volume_statistics(dataset, limits={"worn_volume": 1.0})
+    assert (given["worn_volume_below_limit"] == 1.0).all()
+    with pytest.raises(ValueError, match="not wear_depth = -1"):
+        worn_volume_statistics(dataset, limits={"wear_depth": -1.0})
 
 
 def test_two_hills_are_reported_with_the_pair_that_decides():

@@ -150,6 +150,13 @@ scatter.samples, scatter.mu.normal.sigma, axes.damping, scene.area, scene.mas
         {DRAW}.correlation_length=0.1
         scatter.gap={{normal={{std=1}}, of='each pair', correlation_length=1}} -> scatter.gap.correlation_length
         scatter.stifness={{normal={{std=0.1}}}}
+        scatter.limits={{depth=1e-6}} -> scatter.limits.depth
+        scatter.limits={{wear_depth=-1e-6}} -> scatter.limits.wear_depth
+        scatter.limits={{worn_volume='1 mm3'}} -> scatter.limits.worn_volume
+        scatter.limits={{}}
+        slow_time.until={{wear_depth=1e-5}} ; scatter.limits={{wear_depth=5e-6}}
+        scatter={{limits={{wear_depth=5e-6}}}} -> scatter.samples
+        scatter={{samples=8, limits={{wear_depth=5e-6}}}} -> scatter.samples
         scatter.mass={{normal={{std=1}}}}
         axes.frequency=[1, 2] ; scatter.frequency={{normal={{mean=1, std=0.1}}}}
         scatter.area={{normal={{std=1e-6}}}} ; outputs.variables=['exact']

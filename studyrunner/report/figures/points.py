@@ -18,7 +18,7 @@ from studyrunner.report.drawing import COLOURS, Drawn, FloatArray, Table, as_sen
 from studyrunner.report.selection import choose, find_course, slow_time, spans_decades
 from studyrunner.result.opening import describe_outcome
 from studyrunner.result.view import NO_VOLUME, Result
-from studyrunner.statistics.study_statistics import describe_ranking, measure_of
+from studyrunner.statistics.sentences import describe_ranking, measure_of
 from studyrunner.system.progress import count
 from studyrunner.units import Scale, scale_for, show_cycles, show_known, show_number, units_of
 from studyrunner.variables import CERTIFICATE
@@ -29,6 +29,7 @@ _MOST_POINTS = 200  # in the table
 _LONG = 9  # characters that stand side by side under a small panel
 _MOST_ROWS, _MOST_CELLS, _LABEL_WIDTH = 24, 400, 20
 _MOST_PANELS, _MOST_LINES = 4, 3  # of samples
+_FAR = 3.0  # times what is worn: a limit above it is not drawn
 _LOWEST, _HIGHEST = 0, 1  # places along the dimension `bound`
 # quantiles between which a band lies, how dark it is, and what it is called
 _BANDS: tuple[tuple[int, int, float, str], ...] = ((0, 4, 0.18, "5 to 95 %"), (1, 3, 0.32, "25 to 75 %"))
@@ -162,31 +163,43 @@ def _choose(
     return points, list(choice.labels), choice.sentence
 
 
-def draw_bands(result: Result, over: str) -> Drawn:
-    """5, 25, 50, 75 and 95 % of the samples over the cycles, or at the last count over the "course"."""
-    statistics, course = _statistics(result), find_course(result) if over == "course" else None
-    if statistics is None or (statistics.sizes["cycle"] < 2 if over == "cycle" else course is None):
+def draw_bands(result: Result, of: tuple[str, str]) -> Drawn:
+    """5, 25, 50, 75 and 95 % of the samples, and the limit. of: worn_volume or wear_depth, and over what: the "cycle",
+    or the "course" at the last count.
+    """
+    (quantity, over), statistics = of, _statistics(result)
+    name, course = f"{quantity}_quantile", find_course(result) if over == "course" else None
+    if (
+        statistics is None
+        or name not in statistics
+        or (statistics.sizes["cycle"] < 2 if over == "cycle" else course is None)
+    ):
         return None
     if course:
         statistics = statistics.isel({"cycle": -1, course.axis: course.index})
-    name, axis = "worn_volume_quantile", course.axis if course else "cycle"
+    axis = course.axis if course else "cycle"
     shown, labels, left_out = _choose(result, statistics, [course.axis] if course else [])
     cycles = scale_for(result.counted, statistics["cycle"].values.astype(float))
     at = course.values if course else cycles(statistics["cycle"].values)
     volumes = [_ends(point, name, axis, "quantile") for point in shown]
     wrong = [_ends(point, f"{name}_error", axis, "quantile") for point in shown]
     known = _largest(*(each[..., _LOWEST] for each in volumes))
-    scale = scale_for("m3", known)
+    scale = scale_for(units_of(statistics[name]), known)
+    limit = float(statistics.get(f"{quantity}_limit", np.nan))
+    limit = limit if limit < _FAR * known else np.nan
     figure, panels = plot.panel_grid(labels, 3.0, sharex=True)
     for panel, volume, error in zip(panels.flat, volumes, wrong, strict=True):
         _draw_band(panel, at, volume, error, scale)
-        panel.set(xlabel=slow_time(result, cycles), ylabel=scale.label("worn volume"))
+        if np.isfinite(limit):
+            panel.plot(at, np.full(len(at), scale(limit)), color=COLOURS[1], label="limit")
+        panel.set(xlabel=slow_time(result, cycles), ylabel=scale.label(quantity.replace("_", " ")))
         if course:
             course.set_axis(panel)
     plot.label_outer(panels)
     panels[0, 0].set_xlim(at.min(), at.max())
     # errors and what is open count to twice what is known
-    plot.set_from_zero(panels[0, 0], scale(min(max(known, _largest(*wrong, *volumes)), 2.0 * known)).item())
+    top = np.fmax(min(max(known, _largest(*wrong, *volumes)), 2.0 * known), limit)
+    plot.set_from_zero(panels[0, 0], scale(top).item())
     n_without = max(int(point["n_without_value"].max()) for point in shown)
     without = f"{count(n_without, 'sample')} without a value to be trusted leave open what they may be"
     return figure, _n_samples(statistics), without if n_without else "", left_out

@@ -20,7 +20,7 @@ from studyrunner.result.view import Result
 from studyrunner.study.study_file import read_study
 from tests.studyrunner.report.cases import check_print, dovetail_file, draw_figure, numbers_of, values_of, with_mesh
 from tests.studyrunner.report.test_precision import finest_file
-from tests.studyrunner.results import fail, result_of_study, sample_file, smooth_result
+from tests.studyrunner.results import SCATTER, fail, result_of_study, sample_file, smooth_result
 
 ALL_DRAWINGS = (
     "final_worn_volume worn_volume worn_volume_map wear_rate_map frequency_response wear_depth worn_profile"
@@ -63,7 +63,7 @@ CASES = {
     "many": (lambda: with_sector(smooth_result(**MANY)), "outcome_map trends", ""),
     "two responses": (lambda: smooth_result(responses=("tip", "root")), "frequency_response", ""),
     "nothing asked for": (lambda: smooth_result(without=NOTHING), "", "worn_volume frequency_response"),
-    "samples": (samples, "worn_volume_bands worn_volume_bands_course exceedance deciding_inputs", ""),
+    "samples": (samples, "worn_volume_bands wear_depth_bands wear_depth_bands_course exceedance deciding_inputs", ""),
     "settings": (lambda: finest_file(1e-4), "precision", ""),
 }
 ON_PAPER = ("many", "two responses", "samples", "settings")
@@ -296,6 +296,10 @@ def test_samples_are_those_of_the_file():
     found = numbers_of(draw_figure(result, "worn_volume_bands"))["211.5 Hz|median"]
     expected = np.quantile(result.dataset["worn_volume"].values[0], 0.5, axis=0, method="inverted_cdf") * 1e9
     np.testing.assert_allclose(found[:, 1], expected, rtol=1e-8)
+    limited = result.dataset.assign_attrs(study=SCATTER + "limits = {wear_depth = 2e-6}\n")
+    found = numbers_of(draw_figure(Result(result.path, limited), "wear_depth_bands"))
+    np.testing.assert_allclose(found["211.5 Hz|limit"][:, 1], 2.0)
+    np.testing.assert_allclose(found["211.5 Hz|median"][:, 1], 10.0 * expected, rtol=1e-8)
     bars = draw_figure(result, "deciding_inputs").figure.axes[0]
     names = [text.get_text().replace("\n", " ") for text in bars.get_xticklabels()]
     assert names[int(np.argmax([patch.get_height() for patch in bars.patches]))] == "wear coefficient"
