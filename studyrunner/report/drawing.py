@@ -296,9 +296,10 @@ def _label(panel: Axes, axis: str) -> str:
 def _series(panel: Axes) -> Iterator[tuple[str, Any, Any, Any]]:
     """Label, x, y, and error or value of what is drawn."""
     for line in panel.get_lines():
-        x, y = line.get_data()
-        if not str(line.get_label()).startswith("_") or np.size(x) > 2:
-            yield str(line.get_label()), x, y, getattr(line, _ERROR, np.full(np.shape(y), np.nan))
+        (x, y), label = line.get_data(), str(line.get_label())
+        # the ends of error bars have this label
+        if label != "_nolegend_" and (not label.startswith("_") or np.size(x) > 2):
+            yield label, x, y, getattr(line, _ERROR, np.full(np.shape(y), np.nan))
     for each in panel.collections:
         values: Any = each.get_array()
         if isinstance(each, QuadMesh) and panel.get_label() != "<colorbar>":

@@ -268,7 +268,11 @@ def _with_units(study: Study, design: Design) -> Study:
     for name, column in design.columns.items():
         units = of_scenes.get(name) or COORDINATES[name].units
         if column.unit is not None and column.unit not in (units, *(("", "-") if units == "1" else ())):
-            remedy = f"give the column in {'no unit' if units == '1' else units}, or without a unit"
+            remedy = (
+                "give plain numbers, without a unit"
+                if units == "1"
+                else f"give the column in {units}, or without a unit"
+            )
             raise UserError(design.source, f"column {column.key}", Verbatim(f"[{column.unit}]"), remedy)
     return study
 
