@@ -13,7 +13,6 @@ from studyrunner.kinds.task import TaskPlan, Work, with_tasks
 from studyrunner.scene.answers import remarks_of_study
 from studyrunner.scene.scene import SceneFacts, farthest_from_default, values_of_point
 from studyrunner.scene.scene_set import SceneSet, merge_facts, plan_scenes
-from studyrunner.statistics.sentences import what_samples_tell
 from studyrunner.study.sections import AUTO, SOLVER_AXES
 from studyrunner.study.study import MISSIONS, MODES, Study
 from studyrunner.system.progress import count, format_seconds
@@ -106,6 +105,8 @@ def _of_study(
         yield "scenes", f"{len(of_scenes)}, built once each, with {pairs}"
     yield "points", f"{plan.n_points}" + (f" = {shape}" if shape else "")
     if study.scatter is not None:
+        from studyrunner.statistics.sentences import what_samples_tell  # a run without samples needs no xarray
+
         yield "samples", what_samples_tell(study.scatter)
     if study.follow is not None:
         what = f"{study.follow.of}, found between {study.follow.low:g} and {study.follow.high:g} Hz by the sweep"
