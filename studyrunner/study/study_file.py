@@ -1,9 +1,7 @@
 """Reads a study: finds the file, applies the overrides, checks all of it; and writes the effective study as TOML."""
 
 import contextlib
-import copy
 import json
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from importlib import resources
@@ -19,6 +17,7 @@ from studyrunner.scatter import flat_table
 from studyrunner.study import scene_axes, sections
 from studyrunner.study.design import Design, read_archived_design, read_design
 from studyrunner.study.mistakes import check_tables, keys_as_given, nearest_name, raise_wrong
+from studyrunner.study.overrides import override, with_design
 from studyrunner.study.room import with_room_for_wear
 from studyrunner.study.rules import broken_rules
 from studyrunner.study.scene_section import WORN_AXIS, Origin, SceneSection, find_scene, parameters_of, read_worn
@@ -29,12 +28,6 @@ from studyrunner.values import listed
 from studyrunner.variables import FOLLOWED_FREQUENCY
 
 _IDLE_FREQUENCY = 1.0  # Hz, where no point has a frequency of the axis
-_INSTEAD = {"axes.frequency": "frequency_ratio", "axes.frequency_ratio": "frequency"}
-"""Keys that stand in each other's place."""
-
-_NO_COLUMNS = ("model", "worn", "mode", "modal_amplitude")
-"""Names that no column of a design has: each point has whole modes, over their amplitude."""
-
 _ON_REQUEST = ("scatter", "loading")
 
 
@@ -58,7 +51,7 @@ def read_study(study: str | Path, overrides: Sequence[str] | Mapping[str, object
             table = read_toml(archived.study.encode(), source)
             columns = cast("Any", table.pop("points", {})).get("columns")
             design = read_archived_design(path, source, columns) if columns else None
-            whole = _with_design(table, design)
+            whole = with_design(table, design)
             scene = _scene_of_result(whole, source, design) if archived.holds_scene else None
             before = _about_scenes(_tables_of(whole, source))
         else:
@@ -67,8 +60,8 @@ def read_study(study: str | Path, overrides: Sequence[str] | Mapping[str, object
         raise UserError(source, "the file", None, f"give a file that can be read: {error.strerror}") from None
     if points is not None or (isinstance(overrides, Mapping) and "points" in overrides):
         design = None if points is None else read_design(points)
-    _override(table, overrides, design)
-    table = _with_design(table, design)
+    override(table, overrides, design)
+    table = with_design(table, design)
     if archived is not None and _about_scenes(_tables_of(table, source)) != before:
         archived = replace(archived, scene_sha256=None)
     with contextlib.nullcontext() if design is None else design.errors():
@@ -286,97 +279,3 @@ def _worn_states(study: Study) -> dict[str, object] | None:
     variants = study.variants[: len(counts)] if counts else (study,)
     depths = [list(each.scene.worn.depth[0]) for each in variants if each.scene.worn]
     return {"cycle": counts, "depth": depths, "result": worn.result} if counts else {"depth": depths}
-
-
-# --- overrides ---
-
-
-def _override(
-    table: scene_axes.Tables, overrides: str | Sequence[str] | Mapping[str, object], design: Design | None
-) -> None:
-    """Sets keys of a study. overrides: as in `read_study`; a value None leaves a key out.
-
-    Raises UserError, also where a key is a column of the design.
-    """
-    columns = () if design is None else tuple(column.key for column in design.columns.values())
-    if isinstance(overrides, Mapping):
-        source, option, given = "overrides", "", [(key, _as_toml(value)) for key, value in overrides.items()]
-    else:
-        texts = [overrides] if isinstance(overrides, str) else overrides
-        source, option, given = "command line", "--set ", [_key_and_value(text) for text in texts]
-    for key, value in given:
-        if not isinstance(key, str) or not all(key.split(".")) or not _set_key(table, key, value):
-            remedy = "give the dotted name of a key in a table, that of a block with the name of the block"
-            raise UserError(source, f"{option}{key}", value, remedy)
-        if key.partition(".")[2] in columns and design is not None:
-            raise UserError(source, f"{option}{key}", value, f"leave it out: it is a column of {design.source}")
-
-
-def _with_design(given: Mapping[str, object], design: Design | None) -> scene_axes.Tables:
-    """A study with the columns of a design as axes, in place of what stands there, or in the tables of their keys."""
-    table = dict(copy.deepcopy(given))
-    if design is None:
-        return table
-    for column in design.columns.values():
-        is_twice = _INSTEAD.get(f"axes.{column.key}") in design.columns
-        if is_twice or column.key in _NO_COLUMNS or not _set_key(table, f"axes.{column.key}", column.values):
-            remedy = "leave it out: give it in the study, and of frequency and frequency_ratio one"
-            raise UserError(design.source, f"column {column.key}", None, remedy)
-        words = [value for value in column.values if isinstance(value, str)]
-        if words and column.key == "frequency":
-            remedy = "give Hz: what follows a resonance stands under [axes] of the study, for all points"
-            raise design.located(UserError(design.source, "axes.frequency", words[0], remedy))
-        first, *inner = column.key.split(".")
-        for name in ("scene", "wear") if inner else ():
-            own = scene_axes.only_table(cast("Any", table.get(name, {})).get(first))
-            if isinstance(own, dict):
-                own.pop(inner[0], None)
-    return table
-
-
-def _set_key(table: scene_axes.Tables, key: str, value: object) -> bool:
-    """Sets the key of a dotted name, or with None leaves it out; whether there is a table that can hold it."""
-    (*names, last), place = key.split("."), cast("Any", table)
-    for name in names:
-        if isinstance(place, list):
-            # blocks of a mission, by number or name
-            blocks = {str(number): each for number, each in enumerate(place)}
-            place = (blocks | {str(each.get("name")): each for each in place if isinstance(each, dict)}).get(name)
-        else:
-            place = place.setdefault(name, {}) if isinstance(place, dict) else None
-    if not isinstance(place, dict):
-        return False
-    if value is None:
-        place.pop(last, None)
-        return True
-    place[last] = value
-    place.pop(_INSTEAD.get(key, ""), None)
-    # the last place where a key is given counts, here or under [axes]
-    tables = ("solver",) if last in sections.SOLVER_AXES else ("scene", "wear")
-    others = {"axes": tables, **dict.fromkeys(tables, ("axes",))}
-    for other in others.get(".".join(names), ()) if not scene_axes.is_table(value) else ():
-        given = table.get(other)
-        if isinstance(given, dict) and not scene_axes.is_table(given.get(last)):
-            given.pop(last, None)
-    return True
-
-
-def _key_and_value(text: str) -> tuple[str, object]:
-    """The key and the value in KEY=VALUE, where VALUE is TOML or a bare word. Raises UserError."""
-    key, _, value = (part.strip() for part in text.partition("="))
-    try:
-        parsed = read_toml(f"value = {value}".encode(), "")
-    except UserError:
-        parsed = {"value": value} if re.fullmatch(r"[^\s\"'\[\]{}=,#]+", value) else {}
-    if set(parsed) != {"value"}:
-        remedy = (
-            f'give KEY=VALUE with a TOML value or a bare word; words in a list in quotes, as \'{key}=["up", "down"]\''
-        )
-        raise UserError("command line", f"--set {key}", value, remedy)
-    return key, parsed["value"]
-
-
-def _as_toml(value: object) -> object:
-    """A value as TOML has it: numpy's numbers and arrays, tuples and paths are none of its types."""
-    plain = json.dumps(value, default=lambda each: each.tolist() if hasattr(each, "tolist") else str(each))
-    return json.loads(plain)
