@@ -118,13 +118,16 @@ class Sweep(Generic[S]):
         4 % off).
         """
         here, states, path = self.here, self.reference, self.path
-        if here is None:
+        if not self.with_reference:
             return None
-        if states == ():
-            lasts = not (path.rests(state) or path.forgets(state)) and (path.rests(here) or path.forgets(here))
-            if not lasts:
+        if here is None or states == ():
+            if path.rests(state) or path.forgets(state):
                 return None
-            states = (self._before_slip(here, state, run),)
+            if here is None:
+                return Failure(Outcome.BRANCH_LOST, "no sweep leads to the state, whose friction has a history")
+            if not (path.rests(here) or path.forgets(here)):
+                return None
+            states = self._before_slip(here, state, run)
         found = None if states is None else _led(path.at(state.resolution), states, (state.parameter,), run)
         return found[-1] if found else Failure(Outcome.BRANCH_LOST, "the reference sweep is lost")
 
@@ -216,7 +219,7 @@ class Sweep(Generic[S]):
         if self.reference == ():
             if self.path.rests(step.state):
                 return
-            self.reference = (self._before_slip(before, step.state, self.run),)
+            self.reference = self._before_slip(before, step.state, self.run)
         self.skipped = (*self.skipped, step.state.parameter)
         if self.reference is not None and len(self.skipped) == STEPS_OF_REFERENCE:
             path = self.path.at(fewer(self.path.case.resolution, self.path.case.settings))
@@ -228,17 +231,21 @@ class Sweep(Generic[S]):
             self.reference = found or _led(path, self.reference, (*self.skipped[:-1], middle), rough) or None
             self.skipped = ()
 
-    def _before_slip(self, before: S, after: S, run: Run) -> S:
-        """Last state without slip that is found on the way from a node to a state where pairs slip; else the node.
+    def _before_slip(self, before: S, after: S, run: Run) -> tuple[S] | None:
+        """Last state without slip that is found on the way from a node to a state where pairs slip, or the node; None
+        where no state is found between them.
 
         The sweep itself goes from node to state on one straight line, as a reference that begins at the node would.
         """
-        step, run = after.parameter - before.parameter, run.fresh()
-        for _ in range(HALVINGS_TO_SLIP if self.path.rests(before) else 0):
+        if not self.path.rests(before):
+            return (before,)
+        step, run, between = after.parameter - before.parameter, run.fresh(), False
+        for _ in range(HALVINGS_TO_SLIP):
             step *= 0.5
             state = self.path.solve((before,), before.parameter + step, run)
+            between = between or state is not None
             before = state if state is not None and self.path.rests(state) else before
-        return before
+        return (before,) if between else None
 
     def _choose_resolution(self) -> float:
         """Choose automatic harmonics and samples of the nodes; returns the estimated relative error of the response."""

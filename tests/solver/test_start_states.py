@@ -287,3 +287,11 @@ def test_a_reference_sweep_that_is_lost_leaves_the_error_unknown(monkeypatch):
     monkeypatch.setattr(sweep_module, "follow", lost)
     start = starts([212.5])[212.5]
     assert (start.outcome, start.wear_rate_error, start.reference) == (Outcome.INACCURATE, np.inf, None)
+
+
+def test_a_state_to_which_no_sweep_leads_has_an_unknown_error(monkeypatch):
+    """Found from rest: its friction has another history than that of a sweep."""
+    monkeypatch.setattr(sweep_module, "SWEEP_ITERATIONS", 0)
+    start = starts([212.5])[212.5]
+    assert start.state is not None
+    assert (start.outcome, start.wear_rate_error, start.reference) == (Outcome.INACCURATE, np.inf, None)
