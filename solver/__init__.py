@@ -7,6 +7,7 @@ For use in Python, from this package itself:
 - `frequency_response`: the joint over frequency, a `FrequencyResponse`;
 - `backbone`: a nonlinear mode of the joint over its amplitude, a `Backbone`;
 - `modal_response`: the response near a resonance from a nonlinear mode alone, a `ModalResponse`;
+- `allowable_amplitude`: the excitation at which the wear just meets a `WearTarget`, an `Allowable`;
 - `march_wear`: wear of the joint over the cycles at one frequency, a `WearHistory`;
 - `integrate_mission`: wear over missions, each a list of `Block`, steady or a `Passage`, a `MissionHistory`;
 - `response_curve`: a whole curve over frequency or excitation amplitude, with folds, unstable parts and Floquet
@@ -23,6 +24,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from solver.allowable import Allowable as Allowable
+    from solver.allowable import allowable_amplitude as allowable_amplitude
     from solver.compliant_contact import with_contact_stiffness as with_contact_stiffness
     from solver.forced_response import FrequencyResponse as FrequencyResponse
     from solver.forced_response import HarmonicBalance as HarmonicBalance
@@ -43,11 +46,13 @@ if TYPE_CHECKING:
     from solver.results.state_report import PeriodicMotion as PeriodicMotion
     from solver.settings import Passage as Passage
     from solver.settings import SolverSettings as SolverSettings
+    from solver.settings import WearTarget as WearTarget
     from solver.whole_response import ResponseCurve as ResponseCurve
     from solver.whole_response import response_curve as response_curve
 
 # Loaded at the first use: rooms import each other through this package, and loading numba takes a while.
 _NAMES = {
+    "allowable": "Allowable allowable_amplitude",
     "compliant_contact": "with_contact_stiffness",
     "forced_response": "FrequencyResponse HarmonicBalance balance_of frequency_response",
     "histories": "integrate_mission march_wear",
@@ -58,7 +63,7 @@ _NAMES = {
     "outcome": "Outcome",
     "results.history": "WearHistory",
     "results.state_report": "PeriodicMotion",
-    "settings": "Passage SolverSettings",
+    "settings": "Passage SolverSettings WearTarget",
     "whole_response": "ResponseCurve response_curve",
 }
 _PLACES = {name: place for place, names in _NAMES.items() for name in names.split()}
