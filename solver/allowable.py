@@ -1,8 +1,8 @@
 """The allowable excitation: the amplitude at which the wear just meets its target at the last cycle count.
 
 Each amplitude has a history of its own, from a sweep of its own. Between an amplitude that wears less and one that
-wears more, Brent's method finds where wear over target is 1. Nothing wears below the amplitude at which slip begins, and
-not far above the wear grows steeply.
+wears more, Brent's method finds where wear over target is 1. Nothing wears below the amplitude at which slip begins;
+above it the wear grows steeply.
 """
 
 import math
