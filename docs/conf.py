@@ -9,7 +9,6 @@ A broken link is a warning, and a warning is an error. Notebooks are not run: th
 from __future__ import annotations
 
 import json
-import runpy
 import tomllib
 from pathlib import Path
 
@@ -42,13 +41,11 @@ html_show_copyright = False
 
 
 def setup(app: Sphinx) -> None:
-    """Adds the list of all pages to the README, the first page, a picture of each notebook, and the reference."""
+    """Adds the list of all pages to the README, the first page, and a picture of each notebook."""
 
     def add_to_page(_: Sphinx, page: str, source: list[str]) -> None:
         if page == root_doc:
             source[0] += "\n" + Path(__file__).with_name("contents.txt").read_text(encoding="utf-8")
-        elif page == "docs/reference":
-            source[0] += "\n" + runpy.run_path(str(Path(__file__).with_name("reference.py")))["reference"]()
         elif page == "docs/notebooks":
             source[0] += "\n" + "\n".join(map(_thumbnail, sorted(ROOT.glob("studies/notebooks/*.ipynb"))))
 

@@ -2,12 +2,13 @@
 
     .venv/bin/python docs/reference.py
 
-prints the page, Markdown. The HTML site has it as well.
+writes the page `docs/reference.md`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from pathlib import Path
 
 from solver.outcome import Outcome
 from studies.fe_models.deck.read import HARMLESS, KEYWORDS
@@ -17,6 +18,7 @@ from studies.scenes import BUNDLED, scene_help
 from studyrunner.coordinates import COORDINATES, SCENE, STUCK_FREQUENCY
 from studyrunner.report.contents import CAPTIONS, FIGURES
 from studyrunner.study.keys import key_list
+from studyrunner.summary.answer import ADVICE
 from studyrunner.variables import (
     ASKED,
     COUNTS,
@@ -29,9 +31,15 @@ from studyrunner.variables import (
     Variable,
 )
 
+HEAD = """# Reference
+
+Keys of a study file, bundled scenes, variables, outcomes, figures and keywords of decks.
+`.venv/bin/python docs/reference.py` makes this page from the tables of the program.
+"""
+
 
 def reference() -> str:
-    """All lists, Markdown, each under a heading of the second level."""
+    """The page, Markdown: all lists, each under a heading of the second level."""
     wear = ASKED | COUNTS | LOOPS | OF_A_HISTORY | SCENE["exact"] | SCENE["natural_frequency"] | SCENE["mesh"]
     sections = {
         "Keys of a study file": key_list(),
@@ -42,8 +50,8 @@ def reference() -> str:
         "Variables of nonlinear modes": _variables(OF_MODES | OF_A_MODE_POINT),
         "Coordinates": _variables(COORDINATES),
         "Outcomes": _table(
-            ("number", "outcome", "meaning"),
-            ((f"{int(each)}", f"`{each}`", each.sentence) for each in Outcome),
+            ("number", "outcome", "meaning", "what to do"),
+            ((f"{int(each)}", f"`{each}`", each.sentence, ADVICE.get(each, "")) for each in Outcome),
         ),
         "Figures of a report": _table(
             ("file", "shows", "how to read it"),
@@ -54,7 +62,7 @@ def reference() -> str:
         ),
         "Keywords of decks": _keywords(),
     }
-    return "\n\n".join(f"## {heading}\n\n{text}" for heading, text in sections.items()) + "\n"
+    return "\n\n".join((HEAD.rstrip(), *(f"## {heading}\n\n{text}" for heading, text in sections.items()))) + "\n"
 
 
 def _variables(variables: Mapping[str, Variable]) -> str:
@@ -93,4 +101,4 @@ def _table(heads: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> str:
 
 
 if __name__ == "__main__":
-    print("# Reference\n\n" + reference(), end="")
+    Path(__file__).with_suffix(".md").write_text(reference(), encoding="utf-8")
