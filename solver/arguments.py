@@ -1,6 +1,8 @@
 """Checks of what users give to the functions of this package; each raises ValueError with a sentence."""
 
 import math
+import time
+from collections.abc import Callable
 from dataclasses import replace
 from typing import get_args
 
@@ -9,7 +11,27 @@ from numpy.typing import ArrayLike
 
 from solver.model import FloatArray, ReducedModel, with_friction
 from solver.outcome import check
+from solver.packing import Keep, Packed
 from solver.settings import Direction, SolverSettings
+
+Progress = Callable[[str], object]
+"""Takes a line about how far a computation is, as `print`."""
+
+SECONDS_A_LINE = 2.0
+"""Least time between two lines."""
+
+
+def lines_to(progress: Progress | None) -> Keep:
+    """Gives `progress` a line from time to time, of what a computation says."""
+    shown_at = time.monotonic()
+
+    def keep(said: Packed | str) -> None:
+        nonlocal shown_at
+        if progress is not None and isinstance(said, str) and time.monotonic() >= shown_at + SECONDS_A_LINE:
+            shown_at = time.monotonic()
+            progress(said)
+
+    return keep
 
 
 def check_case(

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import ArrayLike
 
-from solver.arguments import check_case, check_number, check_numbers, worn_model
+from solver.arguments import Progress, check_case, check_number, check_numbers, lines_to, worn_model
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.state import State, first_response, largest_responses
 from solver.loading_history.start_states import FrequencySweep
@@ -104,6 +104,7 @@ def frequency_response(
     sweep: Direction = "up",
     settings: SolverSettings | None = None,
     wear_depth: ArrayLike | None = None,
+    progress: Progress | None = None,
 ) -> FrequencyResponse:
     """Frequency response of a joint at fixed wear depth.
 
@@ -115,6 +116,7 @@ def frequency_response(
     friction_coefficient: one number for all pairs, or (n_contact,). None for a model with its own.
     sweep: way to a state: "up" or "down" along the frequency, "ramp" with rising excitation at one frequency.
     wear_depth: (n_contact,), m, of a worn joint: opens the pairs as a gap does. Unworn if not given.
+    progress: called with a line from time to time, as `print`.
 
     Raises ValueError where a number is out of its range, where the model lacks nodal diameters that the harmonics need,
     and where friction coefficients are given twice, not at all, or not to each pair.
@@ -123,7 +125,7 @@ def frequency_response(
     model, load, settings = check_case(model, excitation_amplitude, friction_coefficient, sweep, settings)
     model = worn_model(model, wear_depth)
     ascending, place = np.unique(wanted, return_inverse=True)
-    found = dict(FrequencySweep(model, load, sweep, settings).states(ascending))
+    found = dict(FrequencySweep(model, load, sweep, settings, lines_to(progress)).states(ascending))
     starts = [found[index] for index in place.tolist()]
     response, peak, outcome, message = zip(*(_read(model, settings, start) for start in starts), strict=True)
     return FrequencyResponse(

@@ -8,7 +8,16 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import ArrayLike
 
-from solver.arguments import check_case, check_kind, check_number, check_numbers, check_word, worn_model
+from solver.arguments import (
+    Progress,
+    check_case,
+    check_kind,
+    check_number,
+    check_numbers,
+    check_word,
+    lines_to,
+    worn_model,
+)
 from solver.contact.wear_law import ARCHARD, WearLaw, wearing_work
 from solver.loading_history.start_states import FrequencySweep
 from solver.missions.history import integrate_missions
@@ -50,6 +59,7 @@ def march_wear(
     final_share: float = 1e-4,
     wear_depth: ArrayLike | None = None,
     between: tuple[float, float] | None = None,
+    progress: Progress | None = None,
 ) -> WearHistory:
     """Wear history of a joint that vibrates at one frequency, from its unworn state or from given depths on.
 
@@ -102,11 +112,12 @@ def march_wear(
     model = worn_model(model, wear_depth)
     # a law that does not fit the pairs is an error of the caller: raise it before the computation
     wearing_work(law, model.contact)
-    _, start = next(FrequencySweep(model, load, sweep, settings).states(follow or np.array([at])))
+    keep = lines_to(progress)
+    _, start = next(FrequencySweep(model, load, sweep, settings, keep).states(follow or np.array([at])))
     read_at = ToTheEnd(outputs, final_share) if to_the_end else counts
     steps = steps_of(scheme, length)
     request = WearRequest(per_pressure, steps, read_at, law=law, until=until, follow=follow)
-    return next(integrate_together(model, settings, start, (request,)))
+    return next(integrate_together(model, settings, start, (request,), keep))
 
 
 def _check_frequency(
@@ -143,6 +154,7 @@ def integrate_mission(
     until: WearTarget | None = None,
     sweep: Direction = "up",
     largest_step: int | None = None,
+    progress: Progress | None = None,
 ) -> MissionHistory:
     """Mission history of a joint from its unworn state on: blocks of vibration in order, repeated many times.
 
@@ -156,6 +168,7 @@ def integrate_mission(
     - until: wear depth or worn volume at which the history ends before the last of `missions`; `missions_to_target`
       of the history is its number.
     - sweep: way to the state of the first mission, where its first block continues the last one of the mission before.
+    - progress: as for `march_wear`.
     - largest_step: most missions that are computed at once; 1: every mission by itself. By default the error decides.
 
     Raises ValueError where a number is out of its range; where numbers of missions are not whole or do not ascend;
@@ -179,9 +192,9 @@ def integrate_mission(
         check("largest_step", whole, f"give a whole number instead of {largest_step:g}")
     wanted = tuple(sorted({0, *(int(count) for count in counts)}))
     per_pressure = check_number("wear_coefficient", wear_coefficient, least=0.0)
-    return integrate_missions(
-        MissionRequest(checked, per_pressure, wanted, settings, law, until, sweep, largest_step and int(largest_step))
-    )
+    longest = largest_step and int(largest_step)
+    asked = MissionRequest(checked, per_pressure, wanted, settings, law, until, sweep, longest)
+    return integrate_missions(asked, lines_to(progress))
 
 
 def _checked(block: Block, place: int, settings: SolverSettings, law: WearLaw) -> Block:

@@ -8,7 +8,16 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.interpolate import PchipInterpolator
 
-from solver.arguments import check_friction, check_number, check_numbers, check_settings, check_word, worn_model
+from solver.arguments import (
+    Progress,
+    check_friction,
+    check_number,
+    check_numbers,
+    check_settings,
+    check_word,
+    lines_to,
+    worn_model,
+)
 from solver.model import ComplexArray, FloatArray, IntArray, ReducedModel
 from solver.modes.points import Direction, follow_mode
 from solver.outcome import Outcome, check
@@ -59,6 +68,7 @@ def backbone(
     sweep: Direction = "up",
     settings: SolverSettings | None = None,
     wear_depth: ArrayLike | None = None,
+    progress: Progress | None = None,
 ) -> Backbone:
     """Natural frequency and damping ratio of a joint over the amplitude: the backbone curve of a nonlinear mode.
 
@@ -82,7 +92,7 @@ def backbone(
     check("model", not model.contact.laws, "give one all pairs of which rub and open: modes know no other law")
     worn = worn_model(model, wear_depth)
     ascending, place = np.unique(wanted, return_inverse=True)
-    found = dict(follow_mode(worn, ascending, int(mode), sweep, settings))
+    found = dict(follow_mode(worn, ascending, int(mode), sweep, settings, lines_to(progress)))
     columns: dict[str, Any] = {}
     for name in (field.name for field in fields(Backbone) if field.name != "amplitude"):
         values = [getattr(found[index], name) for index in place.tolist()]

@@ -5,6 +5,7 @@ changes the last bits of sums: a computation that may be resumed goes on from th
 """
 
 import json
+from collections.abc import Callable
 from dataclasses import dataclass, fields, is_dataclass
 from functools import cache
 from typing import Any, TypeVar, cast, get_type_hints
@@ -34,6 +35,10 @@ class Packed:
     def n_bytes(self) -> int:
         """Size in a file."""
         return len(self.text) + sum(array.nbytes for array in self.arrays)
+
+
+Keep = Callable[[Packed | str], None]
+"""Takes from time to time what another computation needs to go on, and, in words, where a computation is."""
 
 
 def packable(known: type[T]) -> type[T]:

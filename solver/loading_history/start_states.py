@@ -9,7 +9,7 @@ amplitude is sought from there, as it has small maxima where pairs begin to slip
 """
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import partial
 from itertools import pairwise
@@ -29,7 +29,7 @@ from solver.loading_history.sweep import NODE_ITERATIONS, SWEEP_ITERATIONS, Swee
 from solver.model import FloatArray, ReducedModel
 from solver.newton.run import Budget, Run, guarded
 from solver.outcome import Outcome, is_known_to
-from solver.packing import Packed, pack, unpack
+from solver.packing import Keep, Packed, pack, unpack
 from solver.results.history import StartState
 from solver.results.state_report import evaluated, periodic_state
 from solver.settings import FEWEST_SAMPLES, Direction, FollowedFrequency, Resolution, SolverSettings, allowed
@@ -48,8 +48,7 @@ class FrequencySweep:
     """The sweep over frequencies: one `Sweep` for all points of a cell, or one for each point (ramp).
 
     excitation_amplitude: N.
-    keep: called from time to time with the progress of the sweep, also on the way to a state, and with a string for the
-        position and the activity of the sweep, in words.
+    keep: called from time to time, also on the way to a state.
     with_switching: for which states stability is tested, as in `find_instability`.
     known: frequencies, Hz, and resolutions. Where there are some, each state takes that of the nearest one; its error
         is not estimated, and there is no reference sweep.
@@ -61,7 +60,7 @@ class FrequencySweep:
     excitation_amplitude: float
     direction: Direction
     settings: SolverSettings
-    keep: Callable[[Packed | str], None] = lambda _: None
+    keep: Keep = lambda _: None
     with_switching: bool = True
     known: tuple[tuple[float, Resolution], ...] = ()
     present: Sweep[State] | None = None

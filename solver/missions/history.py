@@ -1,7 +1,6 @@
 """One mission history: the problem over the slow time, comparison with the reference solution, outcome."""
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -17,7 +16,7 @@ from solver.missions.step import MissionStep, attempt_step, values_of
 from solver.model import FloatArray
 from solver.newton.run import Run, guarded
 from solver.outcome import Outcome, absolute, is_known_to
-from solver.packing import Packed, packable
+from solver.packing import Keep, Packed, packable
 from solver.results.history import StartState, describe_cut_off, describe_uncertain, last_error, verdict
 from solver.settings import SHARE_OF_CAUSE, Passage
 from solver.wear.errors import Compared, HistoryError, compare, reach_target
@@ -63,6 +62,7 @@ class MissionProblem:
 
     # each step computes at least one mission
     iterations_per_save = 0
+    unit = "mission"
 
     def __init__(self, mission: MissionRequest, history: Solution | None = None) -> None:
         self.mission, self.history, self.run = mission, history, Run(mission.settings.tolerance)
@@ -171,11 +171,11 @@ def unworn_course(mission: MissionRequest) -> Course:
 
 
 def integrate_missions(
-    mission: MissionRequest, keep: Callable[[Packed], None] | None = None, resume: Packed | None = None
+    mission: MissionRequest, keep: Keep = lambda _: None, resume: Packed | None = None
 ) -> MissionHistory:
     """Mission history of one point of a study, as far as computed, with its outcome.
 
-    keep: called after each step with the progress. resume: as for `wear.history.integrate_together`.
+    keep: called after each step, as `Keep`. resume: as for `wear.history.integrate_together`.
     """
     integrator = Integrator(mission.settings.time_limit, keep, resume)
     solution = integrator.integrate(MissionProblem(mission))

@@ -24,6 +24,7 @@ from solver.model import ComplexArray, FloatArray, ReducedModel
 from solver.modes.mode import TOP_BASE, ModeState, NonlinearMode, Rest, find_rest
 from solver.newton.run import Budget, Run, guarded
 from solver.outcome import Ended, Outcome, is_known_to
+from solver.packing import Keep
 from solver.settings import ROUND_OFF, Resolution, SolverSettings
 
 Direction = Literal["up", "down"]
@@ -58,14 +59,19 @@ class ModePoint(Ended):
 
 
 def follow_mode(
-    model: ReducedModel, amplitudes: FloatArray, number: int, direction: Direction, settings: SolverSettings
+    model: ReducedModel,
+    amplitudes: FloatArray,
+    number: int,
+    direction: Direction,
+    settings: SolverSettings,
+    keep: Keep = lambda _: None,
 ) -> Iterator[tuple[int, ModePoint]]:
     """Points of a nonlinear mode: index and point, one by one, in the order of the way to them.
 
     amplitudes: m sqrt(kg), in any order. number, direction: as in `solver.backbone`.
-    settings: the limit of time holds for each point with the way from the point before.
+    settings: the limit of time holds for each point with the way from the point before. keep: called with words.
     """
-    way = _Way((model, number, settings), direction)
+    way = _Way((model, number, settings), direction, keep)
     for index in sorted(range(len(amplitudes)), key=lambda index: way.place(float(amplitudes[index]))):
         began = computing_time()
         run = Run(settings.tolerance, Budget(deadline=began + settings.time_limit))
@@ -89,11 +95,13 @@ class _Way:
     """The sweeps to the points: one with rising amplitude, and one with falling amplitude from the present `top`.
 
     - asked: model, number of the mode, settings.
+    - report: called with the progress in words.
     - to_rest, spent: Newton iterations to the rest, and those of the way to the last point without other points.
     """
 
     asked: tuple[ReducedModel, int, SolverSettings]
     direction: Direction
+    report: Keep = lambda _: None
     rest: Rest | Failure | None = None
     up: Sweep[ModeState] | None = None
     down: Sweep[ModeState] | None = None
@@ -138,7 +146,7 @@ class _Way:
     def _raised_to(self, rest: Rest, amplitude: float, deadline: float) -> Sweep[ModeState]:
         """The sweep with rising amplitude at the node before an amplitude; without a node where it does not begin."""
         if self.up is None:
-            budget = Budget(self.to_rest, deadline=deadline)
+            budget = Budget(self.to_rest, deadline=deadline, report=self.report)
             first = rest.raised(rest.first_amplitude, Run(rest.mode.case.settings.tolerance, budget))
             self.up = _begun(rest.mode, first, 1.0, budget)
         self.up.budget.deadline = deadline
@@ -150,7 +158,7 @@ class _Way:
         goes. A joint that has its mode only while it slides begins at the top.
         """
         if self.down is None or top != self.top:
-            mode, budget = rest.mode, Budget(self.to_rest, deadline=deadline)
+            mode, budget = rest.mode, Budget(self.to_rest, deadline=deadline, report=self.report)
             if rest.glued:
                 raised = self._raised_to(rest, top, deadline)
                 first = raised.last if raised.ahead is None else raised.ahead.state

@@ -69,6 +69,7 @@ class WearProblem(WearingJoint):
 
     # 1 s of 48 pairs, 17 s of 336; the cost of one more factorisation is negligible
     iterations_per_save = 100
+    unit = "cycle"
 
     def __init__(
         self, case: Case, start: StartState, request: WearRequest, guide: Guide | None = None, stable_end: bool = False

@@ -6,7 +6,6 @@ A `Course` has the ends of the steps, read at any counts, and the count of a tar
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, partial
 from typing import Any, Protocol
@@ -19,8 +18,8 @@ from solver.harmonic_balance.state import Failure
 from solver.loading_history.sweep import STEPS_OF_REFERENCE
 from solver.model import FloatArray, IntArray
 from solver.newton.run import Run, guarded
-from solver.outcome import Outcome
-from solver.packing import Packed, in_rows, pack, packable, unpack
+from solver.outcome import Outcome, in_digits
+from solver.packing import Keep, Packed, in_rows, pack, packable, unpack
 from solver.settings import Resolution, WearTarget
 
 RTOL_RATIO = float(STEPS_OF_REFERENCE)
@@ -212,10 +211,11 @@ class SlowProblem(Protocol):
     """What is integrated. The next step depends on state and course alone; both are frozen and packable.
 
     name: tells apart histories that belong together. course: before the first step. run: has a factorisation, and the
-    Newton iterations so far. iterations_per_save: iterations after which the progress is saved.
+    Newton iterations so far. iterations_per_save: iterations after which the progress is saved. unit: of the counts.
     """
 
     name: str
+    unit: str
     course: Course
     run: Run
     iterations_per_save: int
@@ -282,12 +282,10 @@ class Solution:
 class Integrator:
     """Integrates histories that belong together, each once.
 
-    time_limit: CPU seconds of each. keep: called from time to time with the packed progress. resume: such progress.
+    time_limit: CPU seconds of each. keep: as `Keep`. resume: such progress.
     """
 
-    def __init__(
-        self, time_limit: float, keep: Callable[[Packed], None] | None = None, resume: Packed | None = None
-    ) -> None:
+    def __init__(self, time_limit: float, keep: Keep = lambda _: None, resume: Packed | None = None) -> None:
         self._time_limit, self._keep = time_limit, keep
         self._known: dict[str, Solution] = {} if resume is None else unpack(resume)
 
@@ -306,11 +304,11 @@ class Integrator:
                 self._known[name] = Solution(state, course, after, True, budget.iterations, computing_time() - began)
                 return self._known[name]
             state, course = after
+            self._keep(f"{problem.unit} {in_digits(course.counts[-1], 3)}")
             if budget.iterations >= saved_at + problem.iterations_per_save:
                 # done in every history, so that an interrupted one gives equal numbers
                 problem.run = problem.run.fresh()
                 state, saved_at = in_rows(state), budget.iterations
                 self._known[name] = Solution(state, course, None, False, saved_at, computing_time() - began)
-                if self._keep is not None:
-                    # what its time limit has ended is not complete
-                    self._keep(pack({key: each for key, each in self._known.items() if not each.breaks_off}))
+                # what its time limit has ended is not complete
+                self._keep(pack({key: each for key, each in self._known.items() if not each.breaks_off}))

@@ -15,6 +15,7 @@ from typing import Any, ClassVar, NamedTuple
 import numpy as np
 
 from solver.model import ReducedModel, with_friction
+from solver.packing import Keep as Keep
 from solver.packing import Packed, unpack
 from solver.settings import Automatic, SolverSettings
 from studyrunner.kinds.estimate import AUTOMATIC_HARMONICS
@@ -25,9 +26,6 @@ from studyrunner.scene.scene_set import ContactChange, SceneSet, contact_changes
 from studyrunner.study.sections import AUTO, SOLVER_AXES
 from studyrunner.study.study import Study
 from studyrunner.system.machine import MappedFile, package_digest
-
-Keep = Callable[[Packed | str], None]
-"""Takes the progress of a task: data to continue from, or words."""
 
 EQUAL_POINTS = "all values are those of another point"
 """Reason for a result that points share, whatever the kind of study."""
