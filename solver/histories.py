@@ -111,7 +111,7 @@ def march_wear(
     check("wear_depth", counted, 'give another law: the factors of a "table" depend on depths that count from 0')
     model = worn_model(model, wear_depth)
     # a law that does not fit the pairs is an error of the caller: raise it before the computation
-    wearing_work(law, model.contact)
+    wearing_work(law, model.contact, per_pressure)
     keep = lines_to(progress)
     _, start = next(FrequencySweep(model, load, sweep, settings, keep).states(follow or np.array([at])))
     read_at = ToTheEnd(outputs, final_share) if to_the_end else counts
@@ -204,7 +204,7 @@ def _checked(block: Block, place: int, settings: SolverSettings, law: WearLaw) -
         check_word("begin", block.way, get_args(Begin))
         given = block.model, block.excitation_amplitude, block.friction_coefficient
         model, load, _ = check_case(*given, "up", settings)
-        wearing_work(law, model.contact)
+        wearing_work(law, model.contact, 1.0)
         if block.way == "continue":
             # the way from another amplitude is a ramp of this one
             check_number("excitation_amplitude", load, above=0.0)

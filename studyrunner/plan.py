@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
+from solver.contact.wear_law import WearTable
 from studyrunner.kinds import missions, modes, wear_plan
 from studyrunner.kinds.estimate import AUTOMATIC_HARMONICS, COMPILE_SECONDS, largest_memory, memory_a_rank
 from studyrunner.kinds.task import TaskPlan, Work, with_tasks
@@ -157,9 +158,9 @@ def doubts_of_study(study: Study, facts: SceneFacts | None = None) -> tuple[str,
     parts = [part for variant in study.variants or (study,) for part in (variant, *variant.block_studies)]
     table, until = study.wear.as_law.table, study.slow_time.until or {}
     limits = study.scatter.given_limits if study.scatter else {}
-    factors = [1.0] if table is None else [factor for row in table.factor for factor in row]
+    factors = [factor for row in table.factor for factor in row] if isinstance(table, WearTable) else [1.0]
     wear = [value * factor for value in study.axes.wear_coefficient for factor in factors]
-    of_wear = "wear_coefficient" if table is None else "wear_coefficient times wear.factor"
+    of_wear = "wear_coefficient times wear.factor" if isinstance(table, WearTable) else "wear_coefficient"
     worn = [depth for part in parts if part.scene.worn for state in part.scene.worn.depth for depth in state]
     gap = [abs(value) for value in _numbers(parts, "gap")]
     # variants have the axes of the study

@@ -23,7 +23,7 @@ OF_PAIRS = ("area", "friction_coefficient", "gap")
 """Inputs that may differ between the contact pairs; named as in a scene file."""
 
 _ABOVE_ZERO = ("area", "excitation_amplitude", "frequency")
-_NOT_BELOW_ZERO = ("friction_coefficient", "surfaces_", "threshold", "wear_coefficient")
+_NOT_BELOW_ZERO = ("friction_coefficient", "surfaces_", "threshold", "adhesive", "decay", "wear_coefficient")
 
 _NUGGET = 1e-8
 """Share of the variance of a field that is independent from pair to pair: its Cholesky factor exists then for any

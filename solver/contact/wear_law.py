@@ -12,6 +12,9 @@ period of lambda_N |dX_T|, the mean pressure over the period p, Pa, and the dept
   volume over dissipated energy (Fouvry, Liskiewicz, Kapsa, Hannel, Sauger, Wear 255 (2003) 287).
 - `threshold`: only slip work above a density q, J/m2 per cycle, wears.
 - `table`: f is given at pressures and depths, with bilinear interpolation and constant extrapolation.
+- `power`: c = mu as in `energy`, and f falls with the power density of friction, phi = mu S nu / alpha, W/m2, at the
+  frequency nu: `f = r + (1 - r) exp(-d phi)`. Oxide protects a slow contact less: k_w is that without power, r k_w that
+  at much (Arnaud, Fouvry and others 2021, "abrasive" and "adhesive").
 
 In each law c may differ between surfaces, and the wear rate is proportional to k_w. An implicit step of h cycles solves
 `W = W_k + gain X(S, p, W)`, Eq. (24), with the gain `h k_w / alpha` (the print of (26b) lacks h), pair by pair.
@@ -26,7 +29,7 @@ import numpy as np
 from solver.model import ContactInterface, FloatArray
 from solver.outcome import check
 
-LAWS = ("archard", "energy", "threshold", "table")
+LAWS = ("archard", "energy", "threshold", "table", "power")
 
 
 @dataclass(frozen=True)
@@ -39,26 +42,39 @@ class WearTable:
 
 
 @dataclass(frozen=True)
+class PowerTerms:
+    """How the wear coefficient falls with the power density of friction.
+
+    adhesive: energy wear coefficient at much power, 1/Pa; at none it is that of the history. decay: d, m2/W.
+    """
+
+    adhesive: float
+    decay: float
+
+
+@dataclass(frozen=True)
 class WearLaw:
     """A wear law in the terms of a study.
 
-    - name: one of `LAWS`. threshold: q, J/m2 per cycle. table: f.
+    - name: one of `LAWS`. threshold: q, J/m2 per cycle. table: f, of the laws "table" and "power".
     - surfaces: factor of the wear coefficient for each label of a surface; a pair "flat/cylinder" has the sum of both.
       Empty: factor 1 for each pair.
     - worn: depth of each pair at the start of a history, m, from which the depths of the law "table" count; empty: 0.
 
-    Raises ValueError where the name is another one, the law "table" has no table, or another law has one.
+    Raises ValueError where the name is another one, or `table` does not fit it.
     """
 
     name: str = "archard"
     threshold: float = 0.0
-    table: WearTable | None = None
+    table: WearTable | PowerTerms | None = None
     surfaces: tuple[tuple[str, float], ...] = ()
     worn: tuple[float, ...] = ()
 
     def __post_init__(self) -> None:
         check("law", self.name in LAWS, f'give one of {", ".join(LAWS)} instead of "{self.name}"')
-        check("law", (self.name == "table") == (self.table is not None), 'give a table to the law "table", to no other')
+        taken = {"table": WearTable, "power": PowerTerms}.get(self.name, type(None))
+        remedy = 'give table = WearTable(...) to the law "table", PowerTerms(...) to "power", to no other'
+        check("law", isinstance(self.table, taken), remedy)
 
     def begun_at(self, depth: FloatArray) -> WearLaw:
         """The law of a history that begins at depths (n_contact,), m; only the factors of a table depend on depths."""
@@ -128,20 +144,47 @@ def _between(knots: FloatArray, at: FloatArray) -> tuple[np.ndarray, FloatArray,
 
 
 @dataclass(frozen=True)
+class PowerFactors:
+    """The factors f of the law "power" for the pairs of a joint.
+
+    rest: r, 1. per_work (n_contact,): d phi over the slip work, 1/J, at `frequency`, Hz.
+    """
+
+    rest: float
+    per_work: FloatArray
+    frequency: float = 1.0
+
+    def at(self, slip_work: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Factor of each pair (n_contact,), and the derivative of factor times slip work by the slip work."""
+        power = self.per_work * slip_work
+        falling = (1.0 - self.rest) * np.exp(-power)
+        return self.rest + falling, self.rest + falling * (1.0 - power)
+
+
+@dataclass(frozen=True)
 class WearingWork:
     """The wearing work of the pairs of one joint.
 
-    factor (n_contact,): c, 1. least (n_contact,): q alpha, J. table: f; None for 1.
+    factor (n_contact,): c, 1. least (n_contact,): q alpha, J. table, power: f; None for 1.
     """
 
     factor: FloatArray | float = 1.0
     least: FloatArray | float = 0.0
     table: PairFactors | None = None
+    power: PowerFactors | None = None
+
+    def at(self, frequency: float) -> WearingWork:
+        """The wearing work at a frequency, Hz."""
+        if self.power is None or self.power.frequency == frequency:
+            return self
+        per_work = self.power.per_work * (frequency / self.power.frequency)
+        return replace(self, power=replace(self.power, per_work=per_work, frequency=frequency))
 
     @property
     def largest_factor(self) -> float:
         """Largest possible ratio of wearing work to slip work, 1."""
-        return float(np.max(self.factor)) * (1.0 if self.table is None else float(self.table.factor.max()))
+        most = 1.0 if self.power is None else max(1.0, self.power.rest)
+        return float(np.max(self.factor)) * (most if self.table is None else float(self.table.factor.max()))
 
     def work(self, slip_work: FloatArray, normal_force: FloatArray, depth: FloatArray) -> FloatArray:
         """Wearing work X (n_contact,), J, from slip work, J, mean normal force, N, and depth, m, each (n_contact,)."""
@@ -153,17 +196,21 @@ class WearingWork:
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Derivatives (n_contact,) of `work` by slip work, 1, normal force, m, and depth, N."""
         by_work, none = np.where(slip_work >= self.least, self.factor, 0.0), np.zeros_like(slip_work)
+        if self.power is not None:
+            by_work = by_work * self.power.at(slip_work)[1]
         if self.table is None:
             return by_work, none, none
         work, (value, by_force, by_depth) = self._without_table(slip_work), self.table.at(normal_force, depth)
         return by_work * value, work * by_force, work * by_depth
 
     def amplification(self, slip_work: FloatArray, normal_force: FloatArray, depth: FloatArray) -> float:
-        """Ratio of the relative errors of total wearing work and slip work, 1; above 1 near a threshold."""
+        """Ratio of the relative errors of total wearing work and slip work, at least 1; above 1 near a threshold, and
+        where much power leaves nearly no wear.
+        """
         worn = float(self.work(slip_work, normal_force, depth).sum())
-        if not np.any(self.least) or worn <= 0.0:
+        if not (np.any(self.least) or self.power) or worn <= 0.0:
             return 1.0
-        return float(self.slopes(slip_work, normal_force, depth)[0] @ slip_work) / worn
+        return max(float(np.abs(self.slopes(slip_work, normal_force, depth)[0]) @ slip_work) / worn, 1.0)
 
     def growth(
         self, gain: FloatArray | float, slip_work: FloatArray, normal_force: FloatArray, before: FloatArray
@@ -206,23 +253,27 @@ class WearingWork:
         return grown + (follows * by_force)[:, None] * normal_force_tangent
 
     def _without_table(self, slip_work: FloatArray) -> FloatArray:
-        return self.factor * np.maximum(slip_work - self.least, 0.0)
+        work = self.factor * np.maximum(slip_work - self.least, 0.0)
+        return work if self.power is None else work * self.power.at(slip_work)[0]
 
 
 ARCHARDS_WORK = WearingWork()
 """All slip work wears."""
 
 
-def wearing_work(law: WearLaw, contact: ContactInterface) -> WearingWork:
-    """The wearing work of the pairs of a joint.
+def wearing_work(law: WearLaw, contact: ContactInterface, wear_coefficient: float) -> WearingWork:
+    """The wearing work of the pairs of a joint. wear_coefficient: k_w, 1/Pa, with which the law "power" begins.
 
     Raises ValueError where the surfaces of the law are not those of the pairs.
     """
-    factor = surface_factors(contact.surface, law.surfaces) if law.surfaces else 1.0
-    if law.name == "energy":
+    factor, power, table = surface_factors(contact.surface, law.surfaces) if law.surfaces else 1.0, None, None
+    if law.name in ("energy", "power"):
         factor = factor * contact.friction
-    least, table = law.threshold * contact.area if law.name == "threshold" else 0.0, None
-    if law.table is not None:
+    least = law.threshold * contact.area if law.name == "threshold" else 0.0
+    if isinstance(law.table, PowerTerms):
+        rest = law.table.adhesive / wear_coefficient if wear_coefficient > 0.0 else 1.0
+        power = PowerFactors(rest, law.table.decay * contact.friction / contact.area)
+    elif law.table is not None:
         pressure, depth, values = (np.array(part) for part in (law.table.pressure, law.table.depth, law.table.factor))
         table = PairFactors(pressure, depth, values, contact.area, np.array(law.worn) if law.worn else 0.0)
-    return WearingWork(factor, least, table)
+    return WearingWork(factor, least, table, power)

@@ -75,6 +75,7 @@ class WearHistory(Ended, Presented):
     - cycles (n_output,); worn_volume, m3, wear_rate, m3 per cycle; wear_depth (n_output, n_contact), m.
     - mean_pressure, Pa, slip_range, m, open_fraction (n_output, n_contact): of a period.
     - friction_use (n_output,): largest friction force of any pair over its limit, at any time.
+    - friction_power (n_output, n_contact): power density of friction, W/m2, of a period.
     - response (n_output, n_response): complex first harmonic, m; response_mean, response_peak: mean and largest
       magnitude over a period, m.
     - loop_displacement, loop_force (n_output, n_loops, n_phase, 3): fretting loops of the chosen pairs, m and N.
@@ -113,6 +114,7 @@ class WearHistory(Ended, Presented):
     slip_range: FloatArray
     open_fraction: FloatArray
     friction_use: FloatArray
+    friction_power: FloatArray
     response: ComplexArray
     response_mean: FloatArray
     response_peak: FloatArray

@@ -55,6 +55,7 @@ def report_state(
         "slip_range": largest_distance(evaluation.state_t) / joint.law.state_stiffness,
         "open_fraction": (evaluation.status_t == SEPARATED).mean(axis=1),
         "friction_use": friction_use(joint, evaluation),
+        "friction_power": joint.law.friction_work(evaluation) * joint.omega / (2.0 * np.pi) / joint.contact.area,
         "response": to_complex(response_h)[:, 0],
         "response_mean": response_h[:, 0],
         "response_peak": largest_responses(joint, evaluation),

@@ -57,7 +57,7 @@ def full_check(wearing: WearingJoint, state: WearState) -> tuple[WearState, dict
 def _certificate(wearing: WearingJoint, state: WearState) -> Certificate:
     """The certificate of a state, with the errors of the last choice of its harmonics."""
     estimate = state.checked.estimate
-    wear_rate_error = wearing.wearing_work.amplification(*worn_by(state.at)) * estimate.wear_rate
+    wear_rate_error = wearing.wearing_work(state).amplification(*worn_by(state.at)) * estimate.wear_rate
     certificate = certify(wearing.joint_of(state), state.at)
     return replace(certificate, response_error=estimate.response, wear_rate_error=wear_rate_error)
 

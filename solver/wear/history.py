@@ -62,7 +62,7 @@ def integrate_together(
 def _unknown_course(model: ReducedModel, n_loops: int) -> Course:
     """The course of a history without any state: all values are NaN."""
     of_pairs, of_responses = np.full(model.contact.n_contact, np.nan), np.full(len(model.response_names), np.nan)
-    values: dict[str, Any] = dict.fromkeys(("mean_pressure", "slip_range", "open_fraction"), of_pairs)
+    values: dict[str, Any] = dict.fromkeys(("mean_pressure", "slip_range", "open_fraction", "friction_power"), of_pairs)
     values |= dict.fromkeys(("response_mean", "response_peak"), of_responses) | {"response": of_responses + 0j}
     values |= dict.fromkeys(("loop_displacement", "loop_force"), np.full((n_loops, LOOP_PHASES, 3), np.nan))
     values |= dict.fromkeys(("friction_use", "excitation_frequency", "excitation_frequency_error"), math.nan)

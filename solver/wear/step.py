@@ -57,7 +57,7 @@ def attempt_step(wearing: WearingJoint, state: WearState, length: float, scheme:
         worn_before = depth + w**2 / (1.0 + 2.0 * w) * grown
         implicit_cycles = (1.0 + w) / (1.0 + 2.0 * w) * length
     gain = wearing.gain(implicit_cycles)
-    start = wearing.joint_of(state), state.point.next_history, worn_before, gain, wearing.wearing_work
+    start = wearing.joint_of(state), state.point.next_history, worn_before, gain, wearing.wearing_work(state)
     balance, predicted = first_guess(wearing, state, Balance(*start, state.at.predicted_t), length)
     end = wearing.solve(balance, predicted, state)
     if end is None or _surprise(state, end, predicted) > SMOOTH_CHANGE or _runs_away(state, end):
@@ -130,7 +130,7 @@ def _rate_changes(wearing: WearingJoint, state: WearState, depths: FloatArray, *
     """
     joint, at, gain = wearing.joint_of(state), state.at, wearing.gain(1.0)
     force_tangent, work_tangent = joint.law.tangent(at)
-    by_work, by_force, by_depth = (gain * part for part in wearing.wearing_work.slopes(*worn_by(at)))
+    by_work, by_force, by_depth = (gain * part for part in wearing.wearing_work(state).slopes(*worn_by(at)))
     growth = by_work[:, None] * work_tangent + by_force[:, None] * force_tangent[:, 0]
     changes = depths * (0.0 if fixed_factors else by_depth)
     closing = np.where(joint.component_index % 3 == 0, depths[:, joint.component_index // 3], 0.0)

@@ -17,7 +17,7 @@ from functools import cached_property
 import numpy as np
 
 from solver.accuracy.resolved_state import NOTHING, UNKNOWN, Estimate, left_out
-from solver.contact.wear_law import ARCHARD, WearLaw, wearing_work
+from solver.contact.wear_law import ARCHARD, WearingWork, WearLaw, wearing_work
 from solver.continuation.natural import NEAR_ITERATIONS
 from solver.continuation.phase_lag import PEAK_RISE, rise_of_response, solve_at_lag, solve_at_peak
 from solver.harmonic_balance.dlft import Balance, Evaluation, worn_by
@@ -169,7 +169,7 @@ class WearingJoint:
     """The joint of one wear history.
 
     case: with the resolution of the start. start: unworn state, which exists; its load is that of the history.
-    wearing_work: of the pairs by the wear law. area (n_contact,): m2.
+    area (n_contact,): m2.
     shifts: whether the target is a shift of the resonance, which each state then reports.
     run: counts the iterations, limits the time, and has a factorisation from one solve to the next. A fresh one lets
         the next solve depend on the state alone.
@@ -180,12 +180,16 @@ class WearingJoint:
             case = replace(case, settings=case.settings.of_steps)
         self.case, self.start, self.request, self.area = case, start, request, case.model.contact.area
         self.shifts = request.until is not None and request.until.quantity == "frequency_shift"
-        self.wearing_work = wearing_work(request.law, case.model.contact)
+        self._work = wearing_work(request.law, case.model.contact, request.wear_coefficient)
         self.run = Run(case.settings.tolerance)
 
     def joint_of(self, state: WearState) -> Joint:
         """The joint of a state."""
         return state.point.joint(self.case)
+
+    def wearing_work(self, state: WearState) -> WearingWork:
+        """Of the pairs by the wear law, at the frequency of a state."""
+        return self._work.at(state.point.omega / (2.0 * math.pi))
 
     def gain(self, cycles: float) -> FloatArray:
         """Growth of the depth over wearing work (n_contact,), m/J, in h cycles: `h k_w / alpha`, Eqs. (7), (24)."""
@@ -217,11 +221,12 @@ class WearingJoint:
 
     def with_rates(self, state: WearState) -> WearState:
         """The state with its wear rates, Eqs. (7), (21), (25)."""
-        rate = self.gain(1.0) * self.wearing_work.work(*worn_by(state.at))
+        wearing = self.wearing_work(state)
+        rate = self.gain(1.0) * wearing.work(*worn_by(state.at))
         # the static slip included: where all pairs stick, the vibration alone is round-off
         pressed = np.abs(state.at.force_t[:, 0]).max(axis=1)
         moved = float(pressed @ np.linalg.norm(state.at.displacement_h[:, 1:], axis=(1, 2)))
-        most = max(state.record.most_rate, self.request.wear_coefficient * (self.wearing_work.largest_factor * moved))
+        most = max(state.record.most_rate, self.request.wear_coefficient * (wearing.largest_factor * moved))
         rates = rate * self.area
         largest = np.maximum(state.record.largest_rates, np.abs(np.append(rates, rates.sum())))
         return replace(state, rate=rate, record=replace(state.record, largest_rates=largest, most_rate=most))

@@ -211,12 +211,12 @@ class Parameters(Scene):
         slider = DenHartogSlider(self.mass, self.stiffness, excitation_amplitude, 2.0 * np.pi * frequency)
         # the worn state depends on wear coefficient and cycle count through their product alone
         sliding = np.multiply.outer(wear_coefficients, cycles)
-        known = self.damping == 0.0 and self.contact_stiffness is None and changed <= _KNOWN
+        known = self.damping == 0.0 and self.contact_stiffness is None and changed <= _KNOWN and law.name != "power"
         if not (known and slider.holds(mu * max(load, 0.0))):
             return np.full(sliding.shape, np.nan), np.full((*sliding.shape, 1), np.nan)
         begun, contact = law.begun_at(np.array([worn_depth])), with_friction(self.build(1), mu).contact
         different, places = np.unique(sliding, return_inverse=True)
-        work = wearing_work(begun, contact)
+        work = wearing_work(begun, contact, 1.0)
         depth, force = slider.wear(mu, load, self.normal_stiffness, self.area, work, different)
         response, places = slider.first_harmonic(mu * force), places.reshape(sliding.shape)
         return self.area * depth[places], response[places][..., np.newaxis]

@@ -5,6 +5,7 @@ import math
 import numpy as np
 from pydantic import BaseModel
 
+from solver.contact.wear_law import WearTable
 from studies.scene import ExpectedWear, as_scene
 from studyrunner.study.study import Study
 
@@ -58,9 +59,9 @@ def expected_wear(study: Study) -> ExpectedWear:
 
     law, until = study.wear.as_law, study.slow_time.until or {}
     factor = sum(largest(f"surfaces_{label}", value) for label, value in law.surfaces) if law.surfaces else 1.0
-    if law.name == "energy":
+    if law.name in ("energy", "power"):
         factor *= study.friction_coefficient or 0.0
-    if law.table is not None:
+    if isinstance(law.table, WearTable):
         factor *= max(max(row) for row in law.table.factor)
     cycles = math.inf if study.to_the_end else study.output_counts[-1]
     wear = largest("wear_coefficient", max(study.axes.wear_coefficient)) * factor

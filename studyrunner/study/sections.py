@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, cast
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
-from solver.contact.wear_law import WearLaw, WearTable
+from solver.contact.wear_law import PowerTerms, WearLaw, WearTable
 from solver.settings import TARGETS, Followed, Passage
 from studies.scene import Unit
 from studyrunner.coordinates import SCENE
@@ -105,13 +105,25 @@ class AxesSection(Section):
 class WearSection(Section):
     """[wear]: which law, what it takes, and how surfaces differ."""
 
-    AXES: ClassVar = ("threshold", "surfaces")
-    TAKEN: ClassVar = {"threshold": ("threshold",), "table": ("pressure", "depth", "factor")}
+    AXES: ClassVar = ("threshold", "adhesive", "decay", "surfaces")
+    TAKEN: ClassVar = {
+        "threshold": ("threshold",),
+        "table": ("pressure", "depth", "factor"),
+        "power": ("adhesive", "decay"),
+    }
     """Keys of the laws that take any, beside `surfaces`, which all take."""
+    _NUMBERS: ClassVar = ("threshold", "adhesive", "decay")
 
-    law: Literal["archard", "energy", "threshold", "table"] = Field("archard", description="what wears")
+    law: Literal["archard", "energy", "threshold", "table", "power"] = Field("archard", description="what wears")
     threshold: Annotated[NotNegative | None, Unit("J/m2")] = Field(
         None, description="slip work per area in a cycle below which nothing wears"
+    )
+    adhesive: Annotated[NotNegative | None, Unit("1/Pa")] = Field(
+        None,
+        description="energy wear coefficient at much friction power, Ti-6Al-4V: 5.5e-14; wear_coefficient at none",
+    )
+    decay: Annotated[NotNegative | None, Unit("m2/W")] = Field(
+        None, description="with which it falls with the power density of friction, of Ti-6Al-4V 1.1e-5"
     )
     pressure: _Knots | None = Field(None, description="Pa, ascending: mean over a period, of the rows of factor")
     depth: _Knots | None = Field(None, description="m, ascending: worn depth, of the columns of factor")
@@ -135,21 +147,27 @@ class WearSection(Section):
 
     @property
     def numbers(self) -> dict[str, float]:
-        """Numbers that may scatter, named as dimensions: the threshold, and `surfaces_flat` of a surface flat."""
-        own = {} if self.threshold is None else {"threshold": self.threshold}
+        """Numbers that may scatter, named as dimensions: those of the law, and `surfaces_flat` of a surface flat."""
+        given = {name: getattr(self, name) for name in self._NUMBERS}
+        own = {name: float(value) for name, value in given.items() if value is not None}
         factors = {f"{_OF_SURFACE}{label}": factor for label, factor in (self.surfaces or {}).items()}
         return own | {name: factor for name, factor in factors.items() if name.isidentifier()}
 
     def with_numbers(self, values: Mapping[str, float]) -> "WearSection":
         """With other values of `numbers`."""
         own = {label: values.get(f"{_OF_SURFACE}{label}", factor) for label, factor in (self.surfaces or {}).items()}
-        return self.model_copy(update={"threshold": values.get("threshold", self.threshold), "surfaces": own or None})
+        numbers = {name: values.get(name, getattr(self, name)) for name in self._NUMBERS}
+        return self.model_copy(update={**numbers, "surfaces": own or None})
 
     @property
     def as_law(self) -> WearLaw:
         """As the solver takes it."""
-        # all three, or none
-        table = WearTable(self.pressure or (), self.depth or (), self.factor) if self.factor is not None else None
+        # all three, or both, or none
+        table: WearTable | PowerTerms | None = None
+        if self.factor is not None:
+            table = WearTable(self.pressure or (), self.depth or (), self.factor)
+        elif self.adhesive is not None and self.decay is not None:
+            table = PowerTerms(self.adhesive, self.decay)
         return WearLaw(self.law, self.threshold or 0.0, table, tuple((self.surfaces or {}).items()))
 
 

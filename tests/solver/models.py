@@ -178,7 +178,18 @@ def first_point(case: Case, omega: float, amplitude: float) -> State:
 
 
 def march_wear(
-    model, friction, start, wear_coefficient, step, scheme, cycles, settings, *, keep=None, resume=None, **asked
+    model,
+    friction,
+    start,
+    wear_coefficient,
+    step,
+    scheme,
+    cycles,
+    settings,
+    *,
+    keep=lambda _: None,
+    resume=None,
+    **asked,
 ) -> WearHistory:
     """The history from a start state; asked: what else `WearRequest` has."""
     wanted = WearRequest(wear_coefficient, steps_of(scheme, step), cycles, **asked)

@@ -73,6 +73,8 @@ def test_the_report_is_that_of_the_time_signals(kinds):
         steps = np.linalg.norm(np.diff(slip[pair]), axis=0)
         pressure = 0.5 * (at.force_t[pair, 0] + np.roll(at.force_t[pair, 0], 1))
         assert at.slip_work[pair] == pytest.approx(steps @ pressure, rel=1e-12, abs=1e-20)
+        power = FRICTION * (steps @ pressure) * joint.omega / (2 * np.pi) / model.contact.area[pair]
+        assert report["friction_power"][pair] == pytest.approx(power, rel=1e-12, abs=1e-20)
 
 
 WEAR = 1.1e-11  # 1/Pa

@@ -134,7 +134,7 @@ RESOLUTIONS = ((3, 64), (5, 128))
 
 def node(count, depth, rate, value, resolution=RESOLUTIONS[0], **more):
     """All numbers of a state but its depths are `value`."""
-    numbers = dict.fromkeys(("mean_pressure", "slip_range", "open_fraction"), np.full(2, value))
+    numbers = dict.fromkeys(("mean_pressure", "slip_range", "open_fraction", "friction_power"), np.full(2, value))
     numbers |= dict.fromkeys(("friction_use", "excitation_frequency", "excitation_frequency_error"), value)
     numbers |= dict.fromkeys(("loop_displacement", "loop_force"), np.full((1, 128, 3), value))
     numbers |= dict.fromkeys(("response_mean", "response_peak"), np.full(1, value))

@@ -7,15 +7,24 @@ import pytest
 from scipy.interpolate import RegularGridInterpolator
 from scipy.optimize import brentq
 
-from solver.contact.wear_law import ARCHARDS_WORK, PairFactors, WearingWork, WearLaw, WearTable, wearing_work
+from solver.contact.wear_law import (
+    ARCHARDS_WORK,
+    PairFactors,
+    PowerTerms,
+    WearingWork,
+    WearLaw,
+    WearTable,
+    wearing_work,
+)
 from solver.settings import SolverSettings
 from tests.solver.models import random_balance, random_model
 from tests.solver.test_elements import jacobian_by_differences
-from tests.solver.worn_slider import AREA, END, exact_depths, march
+from tests.solver.worn_slider import AREA, END, FRICTION, OMEGA, WEAR, exact_depths, march
 
 # of the slider, whose pressure falls from 1e5 Pa to nothing while 1e-4 m wear off
 TABLE = WearTable((2e4, 5e4, 9e4), (0.0, 1e-5, 6e-5), ((0.8, 0.2, 0.5), (1.0, 0.6, 0.4), (0.4, 0.8, 0.9)))
 THRESHOLD = 20.0  # J/m2: the slider begins with about 45 of them
+POWER = PowerTerms(0.12 * WEAR, 3e-4)  # of the slider, which begins with 3600 W/m2
 
 
 def random_work(seed, n_contact, n_pressures=4, n_depths=5):
@@ -59,6 +68,7 @@ def test_a_step_grows_by_the_least_root_of_its_own_equation():
 LAWS = {
     "energy": WearLaw("energy", surfaces=(("plane", 1.7),)),
     "threshold": WearLaw("threshold"),
+    "power": WearLaw("power", table=PowerTerms(0.2 * WEAR, 0.0), surfaces=(("plane", 1.7),)),
     "table": WearLaw("table", table=WearTable((2e5, 1e6, 3e6), (0.0, 1e-6, 2e-6), ((1, 2, 1), (0.5, 1, 2), (2, 1, 3)))),
 }
 
@@ -73,7 +83,10 @@ def test_the_jacobian_of_an_implicit_step_is_that_of_central_differences(name):
     density = balance.evaluate(predicted).slip_work / joint.contact.area
     # one pair above it, one below
     chosen = replace(LAWS[name], threshold=float(density[[0, 2]].mean()))
-    law = wearing_work(chosen, joint.contact)
+    if name == "power":
+        # one pair far beyond the power at which it wears most
+        chosen = replace(chosen, table=PowerTerms(0.2 * WEAR, 0.02 / float(density.max())))
+    law = wearing_work(chosen, joint.contact, WEAR).at(250.0)
     balance = replace(balance, wearing=law, wear_gain=gain)
     at = balance.evaluate(predicted)
     by_work, by_force, by_depth = law.slopes(at.slip_work, at.force_h[:, 0, 0], at.wear_depth)
@@ -88,10 +101,13 @@ def test_the_jacobian_of_an_implicit_step_is_that_of_central_differences(name):
 
 def exact_depth(law):
     """Depth of the slider at the end, by the differential equation."""
-    table = law.table
+    table = law.table if law.name == "table" else None
     look = table and RegularGridInterpolator((table.pressure, table.depth), np.array(table.factor))
 
     def wearing(work, pressure, depth):
+        if law.name == "power":
+            phi, rest = FRICTION * work * OMEGA / (2.0 * np.pi) / AREA, law.table.adhesive / WEAR
+            return FRICTION * work * (rest + (1.0 - rest) * np.exp(-law.table.decay * phi))
         if table is None:
             return max(work - law.threshold * AREA, 0.0)
         at = np.clip(pressure, table.pressure[0], table.pressure[-1]), np.clip(depth, 0.0, table.depth[-1])
@@ -101,7 +117,11 @@ def exact_depth(law):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("law", [WearLaw("threshold", THRESHOLD), WearLaw("table", table=TABLE)], ids=lambda x: x.name)
+@pytest.mark.parametrize(
+    "law",
+    [WearLaw("threshold", THRESHOLD), WearLaw("table", table=TABLE), WearLaw("power", table=POWER)],
+    ids=lambda x: x.name,
+)
 def test_histories_are_those_of_the_differential_equation(law):
     exact = exact_depth(law)
     assert abs(exact / exact_depths(np.array([END]))[0] - 1.0) > 0.1
@@ -121,14 +141,18 @@ def test_the_sides_of_a_pair_add_up_and_every_surface_has_a_factor():
     model = random_model(1)
     sides = replace(model.contact, surface=("flat/cylinder", "flat/cylinder", "flat"))
     law = WearLaw(surfaces=(("flat", 1.0), ("cylinder", 0.5)))
-    found = wearing_work(law, sides).work(np.ones(3), np.ones(3), np.ones(3))
+    found = wearing_work(law, sides, WEAR).work(np.ones(3), np.ones(3), np.ones(3))
     assert found.tolist() == [1.5, 1.5, 1.0]
     for wrong in ((("flat", 1.0),), (("flat", 1.0), ("cylinder", 0.5), ("disk", 1.0))):
         with pytest.raises(ValueError, match=r"cylinder|disk"):
-            wearing_work(WearLaw(surfaces=wrong), sides)
+            wearing_work(WearLaw(surfaces=wrong), sides, WEAR)
 
 
-@pytest.mark.parametrize("given", [{"name": "reye"}, {"name": "table"}, {"table": TABLE}], ids=str)
+@pytest.mark.parametrize(
+    "given",
+    [{"name": "reye"}, {"name": "table"}, {"table": TABLE}, {"name": "power"}, {"name": "power", "table": TABLE}],
+    ids=str,
+)
 def test_a_law_without_its_numbers_is_none(given):
     with pytest.raises(ValueError, match=r"^law: "):
         WearLaw(**given)

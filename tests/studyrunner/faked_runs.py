@@ -56,7 +56,10 @@ class Solver:
 # --- histories ---
 
 LIKE_VOLUME = ("worn_volume", "wear_rate", "penetration", "tension", "cone_violation", "energy_error", "friction_use")
-LIKE_DEPTH = ("wear_depth", "mean_pressure", "slip_range", "open_fraction", "response_mean", "response_peak")
+LIKE_DEPTH = (
+    *("wear_depth", "mean_pressure", "slip_range", "open_fraction", "friction_power"),
+    *("response_mean", "response_peak"),
+)
 
 
 def history(cycles: list[float], outcome: Outcome = Outcome.CONVERGED, loops: np.ndarray | None = None) -> WearHistory:
