@@ -42,6 +42,10 @@ def test_the_law_of_a_study_is_the_one_that_wears():
     half = final(*TABLE, "axes.wear_coefficient=1.1e-11", "slow_time.cycles=10000")
     assert shared[1] == pytest.approx(half[0], rel=1e-3)
     assert abs(shared[0] / archard[0] - 1.0) > 0.01
+    # another share of it is left where friction is powerful
+    power, half = ("wear.law=power", "wear.adhesive=2e-12", "wear.decay=1e-3"), "axes.wear_coefficient=5.5e-12"
+    both = final(*power, "axes.wear_coefficient=[1.1e-11, 5.5e-12]")
+    assert both[1] == final(*power, half)[0] > 0.6 * both[0]
 
 
 # --- where histories end ---
