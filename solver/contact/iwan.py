@@ -44,6 +44,11 @@ class IwanJoints:
             check(name, 0.0 < getattr(self, name) < np.inf, "give a finite number above 0")
         check("normal_stiffness", 0.0 <= self.normal_stiffness < np.inf, "give a finite number of at least 0")
 
+    @property
+    def rest_stiffness(self) -> FloatArray:
+        """As in `PairLaw`."""
+        return np.tile([self.normal_stiffness, self.stiffness, self.stiffness], (len(self.pairs), 1))
+
     def element(self, places: IntArray, *of_pairs: Any) -> IwanPairs:
         """As in `PairLaw`."""
         return IwanPairs(places, *of_pairs, self)

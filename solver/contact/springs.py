@@ -34,6 +34,11 @@ class CubicSprings:
             check(name, bool((np.isfinite(given) & (given >= 0.0)).all()), "give finite numbers of at least 0")
             object.__setattr__(self, name, np.array(np.broadcast_to(given, shape)))
 
+    @property
+    def rest_stiffness(self) -> FloatArray:
+        """As in `PairLaw`: k_1."""
+        return self.linear
+
     def element(self, places: IntArray, *of_pairs: Any) -> SpringPairs:
         """As in `PairLaw`."""
         return SpringPairs(places, *of_pairs, self)
