@@ -17,6 +17,7 @@ import numpy as np
 
 from solver.contact.coulomb import OTHER, STICK, friction_limit
 from solver.model import BoolArray, ComplexArray, FloatArray, IntArray
+from solver.outcome import check
 
 if TYPE_CHECKING:
     from solver.structure.fourier import FourierBasis
@@ -39,8 +40,8 @@ class Marched:
     - status_t (n, N): SEPARATED, STICK or SLIP; OTHER of a law without these. periods (n,): number of periods marched.
     - periodicity_error: change of the tangential state over the last period, N.
     - slip_work (n,): integral of normal force times slip distance over a period, J.
-    - inner (n, q): what a law knows at the end of the period beside its state, of other laws maybe more with zeros at the
-      end; q = 0 of friction.
+    - inner (n, q): what a law knows at the end of the period beside its state, perhaps with zeros behind it; q = 0 of
+      friction.
     """
 
     predicted_t: FloatArray
@@ -277,6 +278,18 @@ class Element(ABC):
         samples.
         """
         return np.zeros_like(series_t)
+
+
+def numbers_of_pairs(law: Any, name: str, shape: tuple[int, ...]) -> FloatArray:
+    """A field of a frozen `PairLaw` as numbers (k, *shape), which it then holds, from these or from those of all pairs.
+
+    Raises ValueError where the shape does not fit, or a number is negative or not finite.
+    """
+    given, whole = np.asarray(getattr(law, name), np.float64), (len(law.pairs), *shape)
+    check(name, given.shape in (whole, shape), f"give shape {whole} or {shape} instead of {given.shape}")
+    check(name, bool((np.isfinite(given) & (given >= 0.0)).all()), "give finite numbers of at least 0")
+    object.__setattr__(law, name, np.array(np.broadcast_to(given, whole)))
+    return np.asarray(getattr(law, name))
 
 
 def _scaled(values_h: FloatArray, factor: ComplexArray) -> FloatArray:

@@ -14,55 +14,55 @@ import numpy as np
 from numba import njit
 
 from solver.contact.elastic_pairs import MOST_PERIODS
-from solver.contact.element import Element, Marched, SampledLaw, Tangents
+from solver.contact.element import Element, Marched, SampledLaw, Tangents, numbers_of_pairs
 from solver.model import FloatArray, IntArray
 from solver.outcome import check
 from solver.packing import packable
 from solver.settings import ROUND_OFF
 
+SLIDERS = 20  # in a direction
 SLOW_PERIODS = 8  # on the way from one state to the next
 _SOLVED = 1e-14  # residual of a sample over its forces
 
 
 @packable
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class IwanJoints:
     """A `PairLaw`: Iwan's element in both tangential directions of some pairs, a spring in the closing one.
 
-    pairs: ascending indices. stiffness, limit: k, N/m, and F, N. normal_stiffness: N/m, of the spring. sliders: n.
-    Raises ValueError where a number is out of its range.
+    pairs: ascending indices. stiffness, limit, normal_stiffness (k,) or one number: k, N/m, F, N, of the spring, N/m.
+    Raises ValueError where a number is out of its range, or shapes do not fit.
     """
 
     pairs: tuple[int, ...]
-    stiffness: float
-    limit: float
-    normal_stiffness: float = 0.0
-    sliders: int = 20
+    stiffness: FloatArray
+    limit: FloatArray
+    normal_stiffness: FloatArray
 
     def __post_init__(self) -> None:
-        for name in ("stiffness", "limit", "sliders"):
-            check(name, 0.0 < getattr(self, name) < np.inf, "give a finite number above 0")
-        check("normal_stiffness", 0.0 <= self.normal_stiffness < np.inf, "give a finite number of at least 0")
+        for name in ("stiffness", "limit", "normal_stiffness"):
+            given = numbers_of_pairs(self, name, ())
+            check(name, bool((given > 0.0).all()) or name == "normal_stiffness", "give numbers above 0")
 
     @property
     def rest_stiffness(self) -> FloatArray:
         """As in `PairLaw`."""
-        return np.tile([self.normal_stiffness, self.stiffness, self.stiffness], (len(self.pairs), 1))
+        return np.stack([self.normal_stiffness, self.stiffness, self.stiffness], axis=1)
 
     def element(self, places: IntArray, *of_pairs: Any) -> IwanPairs:
         """As in `PairLaw`."""
-        return IwanPairs(places, *of_pairs, self)
+        return IwanPairs(places, *of_pairs, joints=self)
 
 
 @njit(cache=True)
 def march_sliders(
-    before_t: FloatArray, force_t: FloatArray, series_t: FloatArray, ratio: float, limits: FloatArray, at: FloatArray
+    before_t: FloatArray, force_t: FloatArray, series_t: FloatArray, ratio: Any, limits: FloatArray, at: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray, float, float]:
     """Periods under a predicted force (N,), N, in which `x + sum of forces = p` with x = eps u, until they repeat.
 
     before_t (N,): N, from which it has come. series_t (N, m): synthesis; m = 0 for no derivatives. ratio: k / (n eps).
-    limits (n,), N. at (n,): eps s_j, N, which moves. Returns of the last period x (N,), N, its derivative (N, m), whether
-    a slider sticks (N, n), eps times the dissipated work, N * N; and by how far a slider does not come back, N.
+    limits (n,), N. at (n,): eps s_j, N, which moves. Returns of the last period x (N,), N, its derivative (N, m), where
+    sliders stick (N, n), eps times the dissipated work, N * N; and by how far a slider does not come back, N.
     """
     (n_samples, m), n, x, work, change = series_t.shape, limits.size, 0.0, 0.0, 0.0
     slow = SLOW_PERIODS if np.any(before_t != force_t) else 0
@@ -100,7 +100,7 @@ def march_sliders(
     return x_t, by_t, sticks_t, work, change
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class IwanPairs(Element):
     """Pairs with Iwan's element. The history has the positions of the sliders, n in each direction."""
 
@@ -108,7 +108,7 @@ class IwanPairs(Element):
 
     @property
     def n_history(self) -> int:  # noqa: D102
-        return 2 * self.joints.sliders
+        return 2 * SLIDERS
 
     @property
     def _share(self) -> FloatArray:
@@ -120,12 +120,14 @@ class IwanPairs(Element):
         self, predicted_t: FloatArray, sliders: FloatArray, before_t: FloatArray | None = None, m: int = 0
     ) -> tuple[FloatArray, ...]:
         """As `march_sliders`, each (k, 2, ...), and the sliders (k, 2n), m, at the end."""
-        n, eps = self.joints.sliders, self.penalty.tangential
-        limits, ratio = (2.0 * np.arange(n) + 1.0) * self.joints.limit / n**2, self.joints.stiffness / (n * eps)
+        n, eps = SLIDERS, self.penalty.tangential
+        limits, ratio = np.outer(self.joints.limit / n**2, 2.0 * np.arange(n) + 1.0), self.joints.stiffness / (n * eps)
         at, series_t = (sliders * eps[:, None]).reshape(-1, 2, n), self.basis.synthesis.T[:, :m].copy()
         before_t = predicted_t if before_t is None else before_t
         found = [
-            march_sliders(before_t[pair, 1 + i], predicted_t[pair, 1 + i], series_t, ratio[pair], limits, at[pair, i])
+            march_sliders(
+                before_t[pair, 1 + i], predicted_t[pair, 1 + i], series_t, ratio[pair], limits[pair], at[pair, i]
+            )
             for pair, i in np.ndindex(len(eps), 2)
         ]
         parts = (np.array(each).reshape(len(eps), 2, *np.shape(each[0])) for each in zip(*found, strict=True))
@@ -154,18 +156,17 @@ class IwanPairs(Element):
     def sample_tangents(self, at: Marched, stride: int = 1) -> tuple[FloatArray, FloatArray]:
         """As in Element, but by a change of sliders at the sample before nothing."""
         sticking = self._again(at)[2][:, :, ::stride].sum(axis=3)
-        stiffness = self.joints.stiffness / self.joints.sliders * sticking
-        slope = 1.0 / (1.0 + stiffness / self.penalty.tangential[:, None, None])
+        slope = 1.0 / (1.0 + (self.joints.stiffness / (SLIDERS * self.penalty.tangential))[:, None, None] * sticking)
         own = np.concatenate([np.broadcast_to(1.0 - self._share, (len(slope), 1, slope.shape[2])), slope], axis=1)
         own = np.ascontiguousarray(own.transpose(2, 0, 1))
         return own[..., None] * np.eye(3), np.zeros((*own.shape[:2], 2, 2))
 
     def sampled(self, at: Marched, pairs: IntArray) -> SampledLaw:
         """As in Element: the force falls by `k/n ds'` of sliders that stick, the others follow, `ds = du`."""
-        found, n = super().sampled(at, pairs), self.joints.sliders
-        sticks = self._again(at)[2][pairs].transpose(2, 0, 1, 3).reshape(-1, pairs.size, 2 * n, 1)
-        along = np.repeat(np.eye(3)[1:], n, axis=0)
-        by_inner = -found.by_force @ (self.joints.stiffness / n * sticks * along).swapaxes(2, 3)
+        found, stiffness = super().sampled(at, pairs), self.joints.stiffness[pairs, None, None] / SLIDERS
+        sticks = self._again(at)[2][pairs].transpose(2, 0, 1, 3).reshape(-1, pairs.size, 2 * SLIDERS, 1)
+        along = np.repeat(np.eye(3)[1:], SLIDERS, axis=0)
+        by_inner = -found.by_force @ (stiffness * sticks * along).swapaxes(2, 3)
         # where a slider sticks all the time, its place is given
         kept = (sticks * ~sticks.all(axis=0))[..., 0]
         return replace(found, by_inner=by_inner, inner_by_motion=(1.0 - sticks) * along, kept=kept)
@@ -178,6 +179,3 @@ class IwanPairs(Element):
 
     def started_from(self, at: Marched, _: FloatArray, /) -> FloatArray:  # noqa: D102
         return self.final_history(at, at.force_h)
-
-    def relieved(self, history: FloatArray, force: FloatArray, /) -> FloatArray:  # noqa: D102
-        return history + np.repeat(force, self.joints.sliders, axis=1) / self.joints.stiffness

@@ -1,4 +1,4 @@
-"""Springs that stiffen, `lambda = k_1 u + k_3 u^3` in each direction of a pair: a law without friction or separation."""
+"""Springs that stiffen, `lambda = k_1 u + k_3 u^3` in each direction of a pair, without friction or separation."""
 
 from __future__ import annotations
 
@@ -7,9 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from solver.contact.element import Element, Marched
+from solver.contact.element import Element, Marched, numbers_of_pairs
 from solver.model import FloatArray, IntArray
-from solver.outcome import check
 from solver.packing import packable
 
 
@@ -29,10 +28,7 @@ class CubicSprings:
 
     def __post_init__(self) -> None:
         for name in ("linear", "cubic"):
-            given, shape = np.asarray(getattr(self, name), np.float64), (len(self.pairs), 3)
-            check(name, given.shape in (shape, (3,)), f"give a number for each direction, {shape} or (3,)")
-            check(name, bool((np.isfinite(given) & (given >= 0.0)).all()), "give finite numbers of at least 0")
-            object.__setattr__(self, name, np.array(np.broadcast_to(given, shape)))
+            numbers_of_pairs(self, name, (3,))
 
     @property
     def rest_stiffness(self) -> FloatArray:
@@ -41,10 +37,10 @@ class CubicSprings:
 
     def element(self, places: IntArray, *of_pairs: Any) -> SpringPairs:
         """As in `PairLaw`."""
-        return SpringPairs(places, *of_pairs, self)
+        return SpringPairs(places, *of_pairs, springs=self)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class SpringPairs(Element):
     """Pairs on springs. With `x = eps u` a sample obeys `(1 + k_1 / eps) x + k_3 / eps^3 x^3 = p`."""
 

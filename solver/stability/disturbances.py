@@ -63,8 +63,8 @@ class Monodromy(NamedTuple):
     - turn (4n + p q,): rows of a disturbance as seen from the next sector. n_sectors: m.
 
     n and p count the displacements and pairs of all m sectors, N the samples of a period over m.
-    A disturbance (4n + p q, j) has displacements and velocities (m per sample), both now and at the sample before, and the
-    inner states of the pairs.
+    A disturbance (4n + p q, j) has displacements and velocities (m per sample), both now and at the sample before, and
+    the inner states of the pairs.
     """
 
     response: FloatArray
