@@ -281,12 +281,13 @@ class Element(ABC):
 
 
 def numbers_of_pairs(law: Any, name: str, shape: tuple[int, ...]) -> FloatArray:
-    """A field of a frozen `PairLaw` as numbers (k, *shape), which it then holds, from these or from those of all pairs.
+    """A field of a frozen `PairLaw` as numbers (k, *shape), which it then holds, from these, from those of one pair for
+    all of them, or from one number.
 
     Raises ValueError where the shape does not fit, or a number is negative or not finite.
     """
     given, whole = np.asarray(getattr(law, name), np.float64), (len(law.pairs), *shape)
-    check(name, given.shape in (whole, shape), f"give shape {whole} or {shape} instead of {given.shape}")
+    check(name, given.shape in (whole, shape, ()), f"give a number or shape {whole} instead of {given.shape}")
     check(name, bool((np.isfinite(given) & (given >= 0.0)).all()), "give finite numbers of at least 0")
     object.__setattr__(law, name, np.array(np.broadcast_to(given, whole)))
     return np.asarray(getattr(law, name))

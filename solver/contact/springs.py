@@ -18,7 +18,7 @@ class CubicSprings:
     """A `PairLaw`: springs in the closing and both tangential directions of some pairs, without force where the pairs
     just close. A pair between a displacement and the ground is one whose relative displacement is that displacement.
 
-    pairs: ascending indices. linear, cubic (k, 3) or (3,) for all of them: k_1, N/m, and k_3, N/m3, at least 0.
+    pairs: ascending indices. linear, cubic (k, 3), (3,) for all of them, or one number: k_1, N/m, and k_3, N/m3.
     Raises ValueError where a number is below 0 or not finite, or shapes do not fit.
     """
 
