@@ -20,8 +20,11 @@ from solver.outcome import check
 from solver.packing import packable
 from solver.settings import ROUND_OFF
 
-SLIDERS = 20  # in a direction
-SLOW_PERIODS = 8  # on the way from one state to the next
+SLIDERS = 20
+"""In a direction. A cycle loses 0.1 % more than with very many of them where all slip, 1.4 % where six do."""
+SLOW_PERIODS = 8
+"""Periods from one state to the next. At 1.2 times the frequency of a resonance the response is known to 2 % without
+them, to 0.3 % with 8, and to 0.15 % with 16, which take twice as long."""
 _SOLVED = 1e-14  # residual of a sample over its forces
 
 
