@@ -87,16 +87,20 @@ def march_sliders(
                 low, high = (x, high) if missing > 0.0 else (low, x)
                 x += missing / slope
                 x = x if low < x < high else 0.5 * (low + high)
-            x_t[sample], by_x[:] = x, part * series_t[sample]
+            x_t[sample] = x
+            for k in range(m):
+                by_x[k] = part / slope * series_t[sample, k]
             for j in range(n):
                 if sticks[j]:
-                    by_x += ratio * by[j]
-            by_x /= slope
+                    for k in range(m):
+                        by_x[k] += ratio / slope * by[j, k]
             for j in range(n):
                 if not sticks[j]:
                     place = x - np.sign(x - at[j]) * limits[j] / ratio
                     work += limits[j] * abs(place - at[j])
-                    at[j], by[j] = place, by_x
+                    at[j] = place
+                    for k in range(m):
+                        by[j, k] = by_x[k]
         change = np.abs(at - begun).max()
         if period >= slow and change <= 0.1 * ROUND_OFF * limits[-1]:
             break
