@@ -3,6 +3,7 @@
 For use in Python, from this package itself:
 
 - `build_model`: a `ReducedModel` from mass, damping, stiffness and contact pairs;
+- `CubicSprings`, `IwanJoints`: pairs that do not rub, but are on springs or slip little by little, for `build_model`;
 - `with_contact_stiffness`: the model with a spring in series with each pair, as rough surfaces are;
 - `frequency_response`: the joint over frequency, a `FrequencyResponse`;
 - `backbone`: a nonlinear mode of the joint over its amplitude, a `Backbone`;
@@ -27,6 +28,8 @@ if TYPE_CHECKING:
     from solver.allowable import Allowable as Allowable
     from solver.allowable import allowable_amplitude as allowable_amplitude
     from solver.compliant_contact import with_contact_stiffness as with_contact_stiffness
+    from solver.contact.iwan import IwanJoints as IwanJoints
+    from solver.contact.springs import CubicSprings as CubicSprings
     from solver.forced_response import FrequencyResponse as FrequencyResponse
     from solver.forced_response import HarmonicBalance as HarmonicBalance
     from solver.forced_response import balance_of as balance_of
@@ -54,6 +57,8 @@ if TYPE_CHECKING:
 _NAMES = {
     "allowable": "Allowable allowable_amplitude",
     "compliant_contact": "with_contact_stiffness",
+    "contact.iwan": "IwanJoints",
+    "contact.springs": "CubicSprings",
     "forced_response": "FrequencyResponse HarmonicBalance balance_of frequency_response",
     "histories": "integrate_mission march_wear",
     "missions.mission": "Block MissionHistory",

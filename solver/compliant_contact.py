@@ -27,7 +27,7 @@ LARGEST_CONTACT_STIFFNESS = 1e22
 
 
 def with_contact_stiffness(model: ReducedModel, contact_stiffness: float) -> ReducedModel:
-    """The model with a spring in series with each displacement of each pair.
+    """The model with a spring in series with each displacement of each pair that rubs.
 
     The relative displacements of the new model are those of the contact, at the same indices; the scaled compressions
     of the springs are further displacements at the end.
@@ -38,7 +38,9 @@ def with_contact_stiffness(model: ReducedModel, contact_stiffness: float) -> Red
     right = 0.0 < contact_stiffness <= LARGEST_CONTACT_STIFFNESS
     remedy = f"give a positive number, at most {LARGEST_CONTACT_STIFFNESS:g} N/m3"
     check(f"contact_stiffness is {contact_stiffness}", right, remedy)
-    components, relative = model.contact.component_index, model.contact.relative
+    components = model.contact.component_index
+    rub = model.contact.rubs[components // 3]
+    components, relative = components[rub], model.contact.relative[rub]
     share = np.where(components % 3 == 0, 1.0, TANGENTIAL_RATIO)
     springs = contact_stiffness * share * model.contact.area[components // 3]
     # Compressions of stiff springs are small. Their scale leaves all displacements with stiffnesses of one size.

@@ -31,6 +31,10 @@ class PairLaw(Protocol):
     def pairs(self) -> tuple[int, ...]:
         """Indices of the pairs, ascending."""
 
+    @property
+    def rest_stiffness(self) -> FloatArray:
+        """Stiffness (k, 3), N/m, of the pairs in small motions about rest: a linear mode begins with it."""
+
     def element(self, places: IntArray, *of_pairs: Any) -> Any:
         """The `solver.contact.element.Element` of these pairs in one joint, of which these are the first fields."""
 
@@ -78,6 +82,14 @@ class ContactInterface(_ByRows):
     def rubs(self) -> BoolArray:
         """False (n_contact,) for pairs with a law of `laws`."""
         return ~np.isin(np.arange(self.n_contact), [pair for law in self.laws for pair in law.pairs])
+
+    @cached_property
+    def rest_stiffness(self) -> FloatArray:
+        """That of the laws of `laws` (n_contact, 3), N/m; 0 of pairs that rub."""
+        stiffness = np.zeros((self.n_contact, 3))
+        for law in self.laws:
+            stiffness[list(law.pairs)] = law.rest_stiffness
+        return stiffness
 
     @cached_property
     def friction(self) -> FloatArray:

@@ -7,7 +7,15 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy import sparse
 
-from solver.model import ContactInterface, FloatArray, IntArray, LinearModel, ReducedModel, needed_nodal_diameters
+from solver.model import (
+    ContactInterface,
+    FloatArray,
+    IntArray,
+    LinearModel,
+    PairLaw,
+    ReducedModel,
+    needed_nodal_diameters,
+)
 from solver.outcome import check
 
 OfWaves = ArrayLike | Mapping[int, ArrayLike]
@@ -48,6 +56,7 @@ def build_model(
     response_names: Sequence[str] | None = None,
     n_sectors: int = 0,
     nodal_diameter: int = 0,
+    laws: Sequence[PairLaw] = (),
 ) -> ReducedModel:
     """A structure `M x'' + C x' + K x + (contact forces) = load` and the contact pairs on it.
 
@@ -68,6 +77,7 @@ def build_model(
     - response: indices (n_response,) of x, or a matrix (n_response, n). All of x if not given.
     - position (n_contact, 3), m, surface, response_names: labels that do not change the results.
     - n_sectors, nodal_diameter: of the cyclic structure and of the wave, 0 to n_sectors - 1; 0 for no sector.
+    - laws: of pairs that do not rub and open, as `CubicSprings` and `IwanJoints`.
 
     Raises ValueError where shapes do not fit, a number is not finite, a nodal diameter is missing, a matrix is not
     symmetric or Hermitian, an area is not positive, an index is out of range or used twice, or nothing presses a pair.
@@ -94,9 +104,10 @@ def build_model(
         normal_load=_array("normal_load", normal_load, (n_contact,), repeat=True),
         position=nowhere if position is None else _array("position", position, nowhere.shape),
         surface=_names("surface", ("",) * n_contact if surface is None else surface, n_contact),
+        laws=tuple(laws),
     )
     check("area", (contact.area > 0.0).all(), "give a positive area, m2, to every contact pair")
-    for pair in np.flatnonzero(~contact.has_normal & (contact.normal_load <= 0.0))[:1]:
+    for pair in np.flatnonzero(contact.rubs & ~contact.has_normal & (contact.normal_load <= 0.0))[:1]:
         check("normal_load", False, f"give pair {pair} more than 0 N, as it has no closing displacement to press it")
     default_names = [f"response {index}" for index in range(n_response)]
     names = _names("response_names", default_names if response_names is None else response_names, n_response)

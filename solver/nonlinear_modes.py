@@ -89,7 +89,6 @@ def backbone(
     settings = check_settings(model, settings)
     whole = not isinstance(mode, bool) and int(mode) == mode and mode >= 1
     check("mode", whole, f"give a whole number from 1 on instead of {mode!r}")
-    check("model", not model.contact.laws, "give one all pairs of which rub and open: modes know no other law")
     worn = worn_model(model, wear_depth)
     ascending, place = np.unique(wanted, return_inverse=True)
     found = dict(follow_mode(worn, ascending, int(mode), sweep, settings, lines_to(progress)))

@@ -83,7 +83,7 @@ def _check_contact(contact: ContactInterface, n: int) -> None:
     if contact.friction_coefficient is not None:
         friction = contact.friction_coefficient
         _refuse("contact/friction_coefficient", friction, friction < 0, "give 0 or more")
-    loose = (dofs[:, 0] < 0) & (contact.normal_load <= 0)
+    loose = (dofs[:, 0] < 0) & (contact.normal_load <= 0) & contact.rubs
     remedy = "give a positive normal force in N to a pair without closing displacement"
     _refuse("contact/normal_load", contact.normal_load, loose, remedy)
 

@@ -12,7 +12,7 @@ pairs of one surface are (`contact/position`) are drawn in contact, as are faces
 
 import os
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -21,7 +21,9 @@ import h5py
 import numpy as np
 from numpy.typing import NDArray
 
-from solver.model import ContactInterface, LinearModel, ReducedModel
+from solver.contact.iwan import IwanJoints
+from solver.contact.springs import CubicSprings
+from solver.model import ContactInterface, LinearModel, PairLaw, ReducedModel
 from studies.hdf5 import Datasets, as_whole, find_datasets, open_hdf5, read_attribute, read_dataset, read_text_attribute
 from studies.model_check import check_model, is_grouped
 from studies.scene import SurfaceMesh
@@ -39,6 +41,11 @@ CONTACT = {
 }
 """Fields of the contact pairs, and what their numbers are."""
 LINEAR = ("mass", "damping", "stiffness", "load/static", "load/harmonic", "response/dofs", "response/names")
+LAWS: dict[str, tuple[Callable[..., PairLaw], tuple[str, ...]]] = {
+    "springs": (CubicSprings, ("linear", "cubic")),
+    "iwan": (IwanJoints, ("stiffness", "limit", "normal_stiffness")),
+}
+"""Laws of pairs that do not rub: each a group of `contact` with its numbers for all pairs, 0 for those with others."""
 MESH = ("x", "y", "z", "quad", "part")
 ATTRIBUTES = ("n_sectors", "nodal_diameter")
 PAIRS_ARE_ROWS = ("rows", "pairs")
@@ -130,6 +137,7 @@ def _open_scene(path: Path, group: str) -> Iterator[tuple[h5py.Group, Datasets, 
         prefixes = {k: f"nd/{k}/" for k in sorted(diameters)} or {0: ""}
         known = [f"contact/{name}" for name in CONTACT] + [f"mesh/{name}" for name in MESH]
         known += [prefix + name for prefix in prefixes.values() for name in LINEAR]
+        known += [f"contact/{law}/{name}" for law, (_, names) in LAWS.items() for name in names]
         for key in datasets:
             if key not in (*known, "response/names"):
                 remedy = f"remove it, known are {', '.join(known[: len(CONTACT) + len(MESH)] + list(LINEAR))}"
@@ -202,7 +210,30 @@ def _read_contact(datasets: Datasets) -> ContactInterface:
     found = {name: read_dataset(datasets, f"contact/{name}", CONTACT[name]) for name in keys}
     n_contact = len(found["dofs"])
     absent = {"gap": np.zeros(n_contact), "normal_load": np.zeros(n_contact), "surface": ("",) * n_contact}
-    return ContactInterface(**{**absent, "position": np.full((n_contact, 3), np.nan), **found})
+    laws = tuple(_read_laws(datasets, n_contact))
+    try:
+        return ContactInterface(**{**absent, "position": np.full((n_contact, 3), np.nan), **found}, laws=laws)
+    except ValueError as error:
+        raise SceneError("contact", "two laws of one pair", str(error)) from None
+
+
+def _read_laws(datasets: Datasets, n_contact: int) -> Iterator[PairLaw]:
+    for law, (make, names) in LAWS.items():
+        keys = [f"contact/{law}/{name}" for name in names]
+        if not any(key in datasets for key in keys):
+            continue
+        values = [read_dataset(datasets, key, "real") for key in keys]
+        for key, each in zip(keys, values, strict=True):
+            if len(each) != n_contact:
+                raise SceneError(key, f"shape {each.shape}", f"give a row for each of {n_contact} pairs")
+        pairs = np.flatnonzero(np.any([each.reshape(n_contact, -1).any(axis=1) for each in values], axis=0))
+        try:
+            yield make(tuple(pairs.tolist()), *(each[pairs] for each in values))
+        except ValueError as error:
+            name, remedy = str(error).split(": ", 1)
+            raise SceneError(
+                f"contact/{law}/{name}", "impossible for a pair with other numbers than 0", remedy
+            ) from None
 
 
 def _check_order(contact: ContactInterface) -> None:
@@ -225,6 +256,19 @@ def scene_attributes(model: ReducedModel) -> dict[str, int]:
     return {name: getattr(model, name) for name in ATTRIBUTES} if model.n_sectors else {}
 
 
+def _law_datasets(contact: ContactInterface) -> dict[str, NDArray[np.float64]]:
+    found = dict[str, NDArray[np.float64]]()
+    for law in contact.laws:
+        name = next((name for name, (make, _) in LAWS.items() if type(law) is make), None)
+        if name is None:
+            raise SceneError("contact", type(law).__name__, f"a file holds the laws {', '.join(LAWS)} alone")
+        for field in LAWS[name][1]:
+            given = getattr(law, field)
+            values = found.setdefault(f"contact/{name}/{field}", np.zeros((contact.n_contact, *given.shape[1:])))
+            values[list(law.pairs)] = given
+    return found
+
+
 def scene_datasets(model: ReducedModel, mesh: SurfaceMesh | None) -> Iterator[tuple[str, NDArray[np.generic]]]:
     """Name with its groups and values of each dataset; texts as arrays of numpy's type U."""
     contact = model.contact
@@ -235,6 +279,7 @@ def scene_datasets(model: ReducedModel, mesh: SurfaceMesh | None) -> Iterator[tu
             # HDF5 has no boolean numbers
             yield f"contact/{name}", values.astype(np.int8) if values.dtype.kind == "b" else values
     yield "contact/surface", np.array(contact.surface, dtype=np.str_)
+    yield from _law_datasets(contact).items()
     for k, linear in model.linear.items():
         prefix = f"nd/{k}/" if is_grouped(model) else ""
         for name in ("mass", "damping", "stiffness"):

@@ -37,6 +37,7 @@ class CoulombPairs(Element):
         """What a march has left. force_h (k, 3, m): harmonics of the contact force, N, the normal one in place."""
         force_h[:, 0] = mean_normal_force(period.predicted_t) @ self.basis.analysis
         own = period._asdict() | {"slip_work": period.slip_work / self.state_stiffness}
+        own["inner"] = np.zeros((slid.size, 0))
         del own["friction"], own["change"]
         return Marched(**own, force_h=force_h, slid=slid, periodicity_error=float(period.change.max(initial=0.0)))
 

@@ -17,6 +17,7 @@ import numpy as np
 
 from solver.contact.coulomb import OTHER, STICK, friction_limit
 from solver.model import BoolArray, ComplexArray, FloatArray, IntArray
+from solver.outcome import check
 
 if TYPE_CHECKING:
     from solver.structure.fourier import FourierBasis
@@ -39,6 +40,8 @@ class Marched:
     - status_t (n, N): SEPARATED, STICK or SLIP; OTHER of a law without these. periods (n,): number of periods marched.
     - periodicity_error: change of the tangential state over the last period, N.
     - slip_work (n,): integral of normal force times slip distance over a period, J.
+    - inner (n, q): what a law knows at the end of the period beside its state, perhaps with zeros behind it; q = 0 of
+      friction.
     """
 
     predicted_t: FloatArray
@@ -51,6 +54,7 @@ class Marched:
     periods: IntArray
     periodicity_error: float
     slip_work: FloatArray
+    inner: FloatArray
 
     @property
     def stuck(self) -> BoolArray:
@@ -69,9 +73,11 @@ class Marched:
 class SampledLaw:
     """Derivative of the law of p pairs at N samples, in blocks (N, p, 3, 3) of the pairs:
 
-        by_force dlambda + by_motion du + by_speed dv = by_last_motion du' + by_last_speed dv'.
+        by_force dlambda + by_motion du + by_speed dv = by_last_motion du' + by_last_speed dv' + by_inner dz',
+        dz = inner_by_motion du + kept dz'.
 
-    A prime marks the sample before. Velocities are in m per sample.
+    A prime marks the sample before. Velocities are in m per sample. Inner states z (q,) that a law may have: by_inner
+    (N, p, 3, q), inner_by_motion (N, p, q, 3), kept (N, p, q).
     """
 
     by_force: FloatArray
@@ -79,6 +85,9 @@ class SampledLaw:
     by_speed: FloatArray
     by_last_motion: FloatArray
     by_last_speed: FloatArray
+    by_inner: FloatArray
+    inner_by_motion: FloatArray
+    kept: FloatArray
 
 
 @dataclass(frozen=True)
@@ -162,6 +171,7 @@ class Element(ABC):
             "periods": np.ones(k, np.int64),
             "periodicity_error": 0.0,
             "slip_work": np.zeros(k),
+            "inner": np.zeros((k, 0)),
         }
         return Marched(predicted_t, force_t, **{**nothing, **others})
 
@@ -213,8 +223,9 @@ class Element(ABC):
         passed = np.where(there[:, :, None] & there[:, None, :], own[:, pairs], -np.eye(3) * ~there[:, :, None])
         last = np.zeros((len(own), pairs.size, 3, 3))
         last[:, :, 1:, 1:] = carried[:, pairs]
-        none = np.zeros_like(last)
-        return SampledLaw(-passed, (np.eye(3) - passed) * eps, none, last * eps, none.copy())
+        none, inner = np.zeros_like(last), np.zeros((*last.shape[:3], 0))
+        on_inner = inner, inner.swapaxes(2, 3), inner[:, :, 0]
+        return SampledLaw(-passed, (np.eye(3) - passed) * eps, none, last * eps, none.copy(), *on_inner)
 
     def friction_work(self, at: Marched) -> FloatArray:
         """Work that the law dissipates in a period (k,), J: by default that of friction, at its limit during slip."""
@@ -242,7 +253,7 @@ class Element(ABC):
         """History of pairs that had another law, whose state had a mean position and a `last` one at its end, both
         (k, 2), m.
         """
-        return last
+        return np.pad(last, ((0, 0), (0, self.n_history - last.shape[1])))
 
     # --- only masses move on in a period, and have harmonics above the highest one ---
 
@@ -267,6 +278,19 @@ class Element(ABC):
         samples.
         """
         return np.zeros_like(series_t)
+
+
+def numbers_of_pairs(law: Any, name: str, shape: tuple[int, ...]) -> FloatArray:
+    """A field of a frozen `PairLaw` as numbers (k, *shape), which it then holds, from these, from those of one pair for
+    all of them, or from one number.
+
+    Raises ValueError where the shape does not fit, or a number is negative or not finite.
+    """
+    given, whole = np.asarray(getattr(law, name), np.float64), (len(law.pairs), *shape)
+    check(name, given.shape in (whole, shape, ()), f"give a number or shape {whole} instead of {given.shape}")
+    check(name, bool((np.isfinite(given) & (given >= 0.0)).all()), "give finite numbers of at least 0")
+    object.__setattr__(law, name, np.array(np.broadcast_to(given, whole)))
+    return np.asarray(getattr(law, name))
 
 
 def _scaled(values_h: FloatArray, factor: ComplexArray) -> FloatArray:

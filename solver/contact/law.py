@@ -58,15 +58,15 @@ class Elements(Element):
 
     def _histories(self, compute: Callable[[Element, IntArray], FloatArray]) -> FloatArray:
         """The history of all pairs from what each element says of its places."""
-        found = [compute(each, each.places) for each in self.parts]
-        return self._joined([np.pad(each, ((0, 0), (0, self.n_history - each.shape[1]))) for each in found])
+        return self._joined(_padded([compute(each, each.places) for each in self.parts], 1))
 
     def march(self, predicted_h: FloatArray, history: FloatArray, before_t: FloatArray | None, /) -> Marched:  # noqa: D102
         parts = list[Marched]()
         for each in self.parts:
             begin = None if before_t is None else before_t[each.places]
             parts.append(each.march(predicted_h[each.places], each.own(history), begin))
-        joined: dict[str, Any] = {"periodicity_error": max(each.periodicity_error for each in parts)}
+        inner = self._joined(_padded([each.inner for each in parts], 1))
+        joined: dict[str, Any] = {"periodicity_error": max(each.periodicity_error for each in parts), "inner": inner}
         for name in (each.name for each in fields(Marched) if each.name not in joined):
             joined[name] = self._joined([getattr(each, name) for each in parts])
         return Marched(**joined)
@@ -96,7 +96,8 @@ class Elements(Element):
             wanted = np.flatnonzero(np.isin(each.places, pairs))
             parts.append((each.places[wanted], vars(each.sampled(at.at(each.places), wanted)).values()))
         order = np.argsort(np.concatenate([places for places, _ in parts]))
-        return SampledLaw(*(np.concatenate(each, 1)[:, order] for each in zip(*(of for _, of in parts), strict=True)))
+        columns = zip(*(of for _, of in parts), strict=True)
+        return SampledLaw(*(np.concatenate(_padded(list(each), 2), 1)[:, order] for each in columns))
 
     @cached_property
     def compliance(self) -> ComplexArray:  # noqa: D102
@@ -135,6 +136,12 @@ class Elements(Element):
 
     def beyond_series(self, at: Marched, series_t: FloatArray) -> FloatArray:  # noqa: D102
         return self._each(lambda each, part: each.beyond_series(part, series_t[each.places]), at)
+
+
+def _padded(values: list[FloatArray], first: int) -> list[FloatArray]:
+    """Values of each element, those of the others as long as the longest from an axis on: with zeros at the end."""
+    longest = np.max([each.shape[first:] for each in values], axis=0)
+    return [np.pad(each, [(0, 0)] * first + [(0, n) for n in longest - each.shape[first:]]) for each in values]
 
 
 def build_law(penalty: Penalty, contact: ContactInterface, basis: FourierBasis, omega: float) -> Element:

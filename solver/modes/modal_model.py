@@ -38,15 +38,18 @@ def linear_mode(
     """A mode of the joint, rigid motions left out; None where the joint has fewer modes.
 
     closed (n_contact,): pairs held in the normal direction; sticking: those with friction in the tangential ones, too.
+    Pairs with a law of another kind have its stiffness at rest.
     number: from 1 on in ascending frequency. near: rad/s; the mode nearest to a frequency instead.
     """
-    linear, dofs = model.harmonic_structure(1), model.contact.dofs
+    linear, dofs, closed = model.harmonic_structure(1), model.contact.dofs, closed & model.contact.rubs
+    springs = np.zeros(len(linear.mass))
+    springs[model.contact.relative] = model.contact.rest_stiffness[dofs >= 0]
     stuck = closed & (model.contact.friction > 0.0) if sticking else np.zeros_like(closed)
     held = np.concatenate([dofs[closed, 0], dofs[stuck, 1:].ravel()])
     free = np.setdiff1d(np.arange(len(linear.mass)), held)
     if not free.size:
         return None
-    mass, stiffness = (part[np.ix_(free, free)] for part in (linear.mass, linear.stiffness))
+    mass, stiffness = (part[np.ix_(free, free)] for part in (linear.mass, linear.stiffness + np.diag(springs)))
     # shift and limit of a rigid motion: 1e-12 of the ratio of the traces is of the order of round-off
     shift = NEGLIGIBLE * float(np.real(np.trace(stiffness)) / max(np.real(np.trace(mass)), 1e-300))
     # eigenvalues 1 / (omega^2 + shift), largest first: a mass matrix may be singular, a stiffness as well

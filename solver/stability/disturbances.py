@@ -58,17 +58,22 @@ class Monodromy(NamedTuple):
     - spread (n, 3p): motion under unit contact forces, m/N.
     - inverse (N, 3p, 3p): contact forces from the right-hand side of the law.
     - past (N, p, 3, 12): right-hand side of the law from `du` without contact forces, `du'`, known velocity, `dv'`.
+    - by_inner, inner_by_motion, kept: as in `SampledLaw`, the first one also a part of the right-hand side.
     - places (12p,): rows of these four motions, and 4n for a displacement that does not exist.
-    - turn (4n,): rows of a disturbance as seen from the next sector. n_sectors: m.
+    - turn (4n + p q,): rows of a disturbance as seen from the next sector. n_sectors: m.
 
     n and p count the displacements and pairs of all m sectors, N the samples of a period over m.
-    A disturbance (4n, j) has displacements and velocities (m per sample), both now and at the sample before.
+    A disturbance (4n + p q, j) has displacements and velocities (m per sample), both now and at the sample before, and
+    the inner states of the pairs.
     """
 
     response: FloatArray
     spread: FloatArray
     inverse: FloatArray
     past: FloatArray
+    by_inner: FloatArray
+    inner_by_motion: FloatArray
+    kept: FloatArray
     places: IntArray
     turn: IntArray
     n_sectors: int
@@ -76,8 +81,8 @@ class Monodromy(NamedTuple):
 
 @njit(cache=True)
 def pass_period(of: Monodromy, disturbance: FloatArray) -> FloatArray:
-    """Disturbances (4n, j) a period over m later. Compiled: for small joints a tenth of the time."""
-    n, n_rows, width = of.response.shape[0], of.inverse.shape[1], disturbance.shape[1]
+    """Disturbances (4n + p q, j) a period over m later. Compiled: for small joints a tenth of the time."""
+    n, n_rows, width, n_inner = of.response.shape[0], of.inverse.shape[1], disturbance.shape[1], of.kept.shape[2]
     # rows of now, before, speed, speed_before; and of after, now, known, speed
     state, past, given = disturbance.copy(), np.empty((4 * n, width)), np.empty((2 * n, width))
     right, force, pushed = np.empty((n_rows, width)), np.empty((n_rows, width)), np.empty((n, width))
@@ -98,6 +103,8 @@ def pass_period(of: Monodromy, disturbance: FloatArray) -> FloatArray:
                     place = of.places[12 * pair + m]
                     if place < 4 * n:
                         total += of.past[sample, pair, i, m] * past[place, j]
+                for k in range(n_inner):
+                    total += of.by_inner[sample, pair, i, k] * state[4 * n + pair * n_inner + k, j]
                 right[row, j] = total
         np.dot(of.inverse[sample], right, force)
         np.dot(of.spread, force, pushed)
@@ -106,6 +113,15 @@ def pass_period(of: Monodromy, disturbance: FloatArray) -> FloatArray:
                 after = past[i, j] - pushed[i, j]
                 state[n + i, j], state[3 * n + i, j] = past[n + i, j], past[3 * n + i, j]
                 state[i, j], state[2 * n + i, j] = after, 1.5 * after + past[2 * n + i, j]
+        for inner in range(len(state) - 4 * n):
+            pair, k = inner // n_inner, inner % n_inner
+            for j in range(width):
+                total = of.kept[sample, pair, k] * state[4 * n + inner, j]
+                for i in range(3):
+                    place = of.places[12 * pair + i]
+                    if place < 4 * n:
+                        total += of.inner_by_motion[sample, pair, k, i] * state[place, j]
+                state[4 * n + inner, j] = total
     return state[of.turn]
 
 
@@ -130,9 +146,14 @@ def build_monodromy(joint: Joint, at: Evaluation, n_samples: int, n_sectors: int
     # each sector goes through its own part of the period
     law = SampledLaw(
         *(
-            part.reshape(n_sectors, steps, -1, 3, 3).swapaxes(0, 1).reshape(steps, -1, 3, 3)
+            np.hstack(part.reshape(n_sectors, steps, *part.shape[1:]))
             for part in vars(fine.law.sampled(state, np.flatnonzero(switching))).values()
         )
+    )
+    # of displacements and velocities, now and before, and of the inner states
+    rows_of_sectors = (
+        np.arange(4 * n).reshape(4, n_sectors, -1),
+        4 * n + np.arange(law.kept[0].size).reshape(n_sectors, law.kept[0].size // n_sectors),
     )
     parts = (-law.by_motion - 1.5 * law.by_speed, law.by_last_motion, -law.by_speed, law.by_last_speed)
     return Monodromy(
@@ -140,8 +161,11 @@ def build_monodromy(joint: Joint, at: Evaluation, n_samples: int, n_sectors: int
         spread=np.ascontiguousarray(spread),
         inverse=_inverse_of_law(law, np.where(there[:, None], spread[rows], 0.0)),
         past=np.concatenate(parts, axis=3),
+        by_inner=law.by_inner,
+        inner_by_motion=law.inner_by_motion,
+        kept=law.kept,
         places=np.where(place < 0, 4 * n, place + n * np.arange(4)[:, None]).ravel(),
-        turn=np.roll(np.arange(4 * n).reshape(4, n_sectors, -1), 1, axis=1).ravel(),
+        turn=np.concatenate([np.roll(each, 1, axis=-2).ravel() for each in rows_of_sectors]),
         n_sectors=n_sectors,
     )
 

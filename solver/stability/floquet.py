@@ -247,7 +247,7 @@ def _samples(joint: Joint, at: Evaluation) -> int:
 
 def multipliers_of(monodromy: Monodromy, every: bool) -> ComplexArray:
     """All multipliers, or the largest ones; none where the largest one has not converged by Arnoldi's method."""
-    size, m = 4 * len(monodromy.response), monodromy.n_sectors
+    size, m = monodromy.turn.size, monodromy.n_sectors
     if every:
         return np.asarray(np.linalg.eigvals(pass_period(monodromy, np.eye(size))), np.complex128) ** m
 

@@ -5,6 +5,7 @@ from functools import partial
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 
 from solver import backbone, frequency_response
 from solver.contact.coulomb import SLIP
@@ -125,6 +126,7 @@ class Remembering(Springs):
 class OnSprings:
     pairs: tuple[int, ...]
     kind: type = Springs
+    rest_stiffness: float = STIFFNESS
 
     def element(self, *of_pairs):
         return self.kind(*of_pairs)
@@ -194,6 +196,11 @@ def test_pairs_of_a_law_have_to_be_there_in_order(pairs):
         with_springs(random_model(4, ("3d", "3d")), *pairs)
 
 
-def test_modes_refuse_another_law():
-    with pytest.raises(ValueError, match=r"^model: "):
-        backbone(with_springs(random_model(4, ("3d", "3d")), 1), [1e-6], 0.4)
+def test_a_mode_of_a_joint_on_springs_is_that_of_its_matrices():
+    model = with_springs(random_model(4, ("3d", "3d")), 0, 1)
+    linear, relative = model.linear[0], model.contact.relative
+    stiffness = linear.stiffness.copy()
+    stiffness[relative, relative] += STIFFNESS
+    expected = np.sqrt(eigh(stiffness, linear.mass, eigvals_only=True)[:2]) / (2.0 * np.pi)
+    found = [backbone(model, 1e-4, 0.4, mode=mode).frequency[0] for mode in (1, 2)]
+    assert found == pytest.approx(expected, rel=1e-7)

@@ -1,11 +1,13 @@
 """Scene files: bitwise round trip, other writers' habits, and wrong files, named by their dataset."""
 
 from dataclasses import astuple, replace
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
 import pytest
 
+from solver import CubicSprings, IwanJoints
 from solver.model import LinearModel
 from studies.model_check import check_model
 from studies.scene import SurfaceMesh
@@ -37,6 +39,13 @@ def with_pairs(**values):
     return replace(model, contact=replace(model.contact, **values))
 
 
+LAWS = CubicSprings((0,), [1.0, 2.0, 0.1 + 0.2], [0.0, 0.0, 3.0]), IwanJoints((1,), 4.0, 5.0, 0.0)
+
+
+def joined():
+    return with_pairs(laws=LAWS)
+
+
 MODELS = {
     "plain": plain(),
     "sector": sector(),
@@ -49,6 +58,24 @@ MODELS = {
 def test_round_trip_is_bitwise(tmp_path, name):
     assert bits(read_scene(written(tmp_path, MODELS[name]), 5)) == bits(MODELS[name])
     assert [path.name for path in tmp_path.iterdir()] == ["scene.h5"]
+
+
+def test_laws_of_other_kinds_come_back_and_press_nothing(tmp_path):
+    # two laws of a kind come back as one
+    two = replace(LAWS[0], pairs=(2,))
+    model = with_pairs(laws=(*LAWS, two), normal_load=np.zeros(3))
+    springs, iwan = read_scene(written(tmp_path, model)).contact.laws
+    both = replace(
+        LAWS[0], pairs=(0, 2), **{name: getattr(two, name).repeat(2, axis=0) for name in ("linear", "cubic")}
+    )
+    for found, expected in ((springs, both), (iwan, LAWS[1])):
+        for name, values in vars(expected).items():
+            assert np.array_equal(getattr(found, name), values)
+
+
+def test_a_law_without_datasets_is_refused(tmp_path):
+    with pytest.raises(SceneError, match="springs, iwan"):
+        written(tmp_path, with_pairs(laws=(SimpleNamespace(pairs=(0,)),)))
 
 
 def test_optional_datasets_have_defaults(tmp_path):
@@ -187,6 +214,12 @@ WRONG = [
     (sector, lambda file: file.copy("nd/2", "nd/4"), "nd/4"),
     (sector, attribute("n_sectors", None), "n_sectors"),
     (sector, attribute("nodal_diameter", 1), "nd/1"),
+    (joined, put("contact/iwan/limit", [0.0, 0.0, 0.0]), "contact/iwan/limit"),
+    (joined, put("contact/iwan/stiffness", [4.0]), "contact/iwan/stiffness"),
+    (joined, put("contact/springs/linear", np.ones((3, 2))), "contact/springs/linear"),
+    (joined, put("contact/springs/cubic", np.ones((3, 3))), "contact"),
+    (joined, drop("contact/springs/cubic"), "contact/springs/cubic"),
+    (joined, put("contact/springs/square", np.ones((3, 3))), "contact/springs/square"),
     (MESH, drop("mesh/y"), "mesh/y"),
     (MESH, poke("mesh/x", 1, np.nan), "mesh/x"),
     (MESH, put("mesh/quad", np.zeros((2, 3), dtype=int)), "mesh/quad"),
