@@ -1,8 +1,8 @@
 """Study of wear -> sweeps, and histories from their start states; which points share a history, and why.
 
 The rates of all wear laws but "power" are proportional to the wear coefficient: dW/dt = k_w f(W), Eq. (7). With s k_w
-in place of k_w the same states follow each other, each at the cycle count t / s. Where the scheme chooses its steps, a task
-integrates the history of the largest k_w; the others are read from this one at the counts s t.
+in place of k_w the same states follow each other, each at the cycle count t / s. Where the scheme chooses its steps, a
+task integrates the history of the largest k_w; the others are read from this one at the counts s t.
 """
 
 import itertools
