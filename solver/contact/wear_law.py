@@ -16,7 +16,7 @@ period of lambda_N |dX_T|, the mean pressure over the period p, Pa, and the dept
   frequency nu: `f = r + (1 - r) exp(-d phi)`. Oxide protects a slow contact less: k_w is that without power, r k_w that
   at much (Arnaud, Fouvry and others 2021, "abrasive" and "adhesive").
 
-In each law c may differ between surfaces. In all but `power` the wear rate is proportional to k_w. An implicit step of h
+In each law c may differ between surfaces. In all but `power` the rate is proportional to k_w. An implicit step of h
 cycles solves `W = W_k + gain X(S, p, W)`, Eq. (24), with the gain `h k_w / alpha` (the print of (26b) lacks h), pair by
 pair.
 """
