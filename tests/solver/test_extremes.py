@@ -151,7 +151,7 @@ def test_extreme_cases_end_honestly(name):
 @pytest.mark.slow
 @pytest.mark.parametrize("amplitude", [25.0, 5e-5])
 def test_a_blade_that_is_unseated_or_hardly_loaded_has_states(amplitude):
-    settings = SolverSettings(3, 64)
+    settings = SolverSettings(3, 64, rtol=0.1)
     run_converged(Case(dovetail(), 2 * np.pi * 212.5, 0.5, amplitude, 1.1e-11, 1e3, 1e3, settings=settings))
 
 
