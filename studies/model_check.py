@@ -117,7 +117,8 @@ def _check_linear(linear: LinearModel, prefix: str, n_response: int) -> None:
         if _largest(linear.mass) > 0:
             raise SceneError(f"{prefix}mass", "a negative eigenvalue", "give a positive semidefinite matrix") from None
     # For a positive semidefinite mass, K + i M is singular only where a motion has neither stiffness nor mass.
-    if _is_singular(_scaled(linear.stiffness) + 1j * _scaled(linear.mass)):
+    stiffness, mass = (matrix / (_largest(matrix) or 1.0) for matrix in (linear.stiffness, linear.mass))
+    if _is_singular(stiffness + 1j * mass):
         raise SceneError(f"{prefix}stiffness", "singular together with mass", "give every motion stiffness or mass")
 
 
@@ -163,11 +164,6 @@ def _is_singular(matrix: NDArray[Any]) -> bool:
     factors, _, info = factorise(balanced)
     reciprocal, more = estimate(factors, np.abs(balanced).sum(axis=0).max()) if info == 0 else (0.0, 0)
     return bool(more != 0 or reciprocal <= max(n, 10) * np.finfo(np.float64).eps)
-
-
-def _scaled(matrix: Matrix) -> Matrix:
-    largest = _largest(matrix)
-    return matrix / largest if largest > 0 else matrix
 
 
 def _largest(matrix: Matrix) -> float:

@@ -82,18 +82,12 @@ def lowest(frequencies: FloatArray) -> FloatArray:
     return np.append(own, np.full(N_MODES - len(own), np.nan))
 
 
-@dataclass(frozen=True)
-class Unit:
+class Unit(str):
     """Metadata of a key: the unit of its values, as a result has it."""
 
-    text: str
 
-
-@dataclass(frozen=True)
-class Remark:
+class Remark(str):
     """Metadata of a key: what else a reader has to know, as what is taken where the key is not given."""
-
-    text: str
 
 
 Metre = Annotated[float, Unit("m")]
@@ -119,7 +113,7 @@ def said_of(field: FieldInfo, kind: type[Unit] | type[Remark]) -> str:
 
     def among(part: object) -> Iterator[str]:
         if isinstance(part, kind):
-            yield part.text
+            yield str(part)
         for inner in get_args(part):
             yield from among(inner)
 
@@ -195,12 +189,11 @@ def build_compliant(
     # far from what can be, numbers overflow
     with np.errstate(all="ignore"):
         try:
-            if contact_stiffness is None:
-                return build()
-            if key not in _last_rigid:
+            rigid = _last_rigid.get(key) or build()
+            if contact_stiffness is not None and key not in _last_rigid:
                 _last_rigid.clear()
-                _last_rigid[key] = build()
-            return with_contact_stiffness(_last_rigid[key], contact_stiffness)
+                _last_rigid[key] = rigid
+            return make_compliant(rigid, contact_stiffness)
         except SceneError:
             raise
         except (ArithmeticError, ValueError, IndexError, MemoryError) as error:

@@ -282,11 +282,8 @@ def scene_datasets(model: ReducedModel, mesh: SurfaceMesh | None) -> Iterator[tu
     yield from _law_datasets(contact).items()
     for k, linear in model.linear.items():
         prefix = f"nd/{k}/" if is_grouped(model) else ""
-        for name in ("mass", "damping", "stiffness"):
-            yield prefix + name, getattr(linear, name)
-        yield f"{prefix}load/static", linear.load_static
-        yield f"{prefix}load/harmonic", linear.load_harmonic
-        yield f"{prefix}response/dofs", linear.response
+        for name in LINEAR[:-1]:  # "load/static" is `load_static`, "response/dofs" is `response`
+            yield prefix + name, getattr(linear, name.replace("/", "_").removesuffix("_dofs"))
         yield f"{prefix}response/names", np.array(model.response_names, dtype=np.str_)
     if mesh is not None:
         for column, axis in enumerate("xyz"):

@@ -60,39 +60,26 @@ def file_digest(path: Path) -> str:
 
 @dataclass(frozen=True)
 class Units:
-    """A system of units by its length (m), mass (kg) and time (s); what is derived from them follows, in SI units.
+    """A system of units with the second, its units in those of SI: m, kg, N/m, N, kg/m3, Pa.
 
     label_of_length, label_of_mass: for messages.
     """
 
     name: str
-    length: float
-    mass: float
     label_of_length: str
     label_of_mass: str
-
-    @property
-    def stiffness(self) -> float:
-        """N/m."""
-        return self.mass  # mass / s2
-
-    @property
-    def force(self) -> float:
-        """N."""
-        return self.mass * self.length  # mass length / s2
-
-    @property
-    def density(self) -> float:
-        """kg/m3."""
-        return self.mass / self.length**3
-
-    @property
-    def stress(self) -> float:
-        """Pa."""
-        return self.mass / self.length
+    length: float
+    mass: float
+    stiffness: float
+    force: float
+    density: float
+    stress: float
 
 
-UNITS = {"SI": Units("SI", 1.0, 1.0, "m", "kg"), "mm-t-s": Units("mm-t-s", 1e-3, 1e3, "mm", "t")}
+UNITS = {
+    name: Units(name, *labels, length, mass, mass, mass * length, mass / length**3, mass / length)
+    for name, labels, length, mass in (("SI", ("m", "kg"), 1.0, 1.0), ("mm-t-s", ("mm", "t"), 1e-3, 1e3))
+}
 """Systems of units by their names."""
 
 

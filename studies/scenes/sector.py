@@ -133,20 +133,15 @@ def mesh_of_bodies(
         ends = np.cumsum([0] + [block[..., 0].size for block in blocks])
         for block, part, (start, end) in zip(blocks, parts, pairwise(ends), strict=True):
             grids.append(n_nodes + node[start:end].reshape(block.shape[:3]).astype(np.int64))
-            cells = _cells(grids[-1])
-            numbers = n_elements + np.arange(len(cells)) + 1
-            groups.append(ElementGroup("C3D8I", cells, numbers, material, part))
+            ahead = [(i, j, k) for k in (0, 1) for i, j in ((0, 0), (1, 0), (1, 1), (0, 1))]
+            n_i, n_j, n_k = (size - 1 for size in grids[-1].shape)
+            corners = [grids[-1][i : i + n_i, j : j + n_j, k : k + n_k] for i, j, k in ahead]
+            cells = np.stack(corners, axis=-1).reshape(-1, 8)
+            groups.append(ElementGroup("C3D8I", cells, n_elements + np.arange(len(cells)) + 1, material, part))
             n_elements += len(cells)
         nodes.append(points[np.sort(first)])
         n_nodes += len(first)
     return SolidMesh(np.concatenate(nodes), np.arange(n_nodes) + 1, tuple(groups)), tuple(grids)
-
-
-def _cells(grid: IntArray) -> IntArray:
-    """Corner nodes (n_cells, 8) of the cells of a grid of node numbers."""
-    n_i, n_j, n_k = (size - 1 for size in grid.shape)
-    corners = [grid[i : i + n_i, j : j + n_j, k : k + n_k] for k in (0, 1) for i, j in ((0, 0), (1, 0), (1, 1), (0, 1))]
-    return np.stack(corners, axis=-1).reshape(-1, 8)
 
 
 def graded(stations: Sequence[float], divisions: Sequence[int]) -> FloatArray:

@@ -63,14 +63,6 @@ class SurfacePair:
 
 
 @dataclass(frozen=True)
-class CyclicSymmetry:
-    """A sector. axis (2, 3): two points on the axis."""
-
-    n_sectors: int
-    axis: FloatArray
-
-
-@dataclass(frozen=True)
 class NodalValue:
     """A displacement, 0 where it is held, or a force of each of some nodes (p,) along the dofs from first to last.
 
@@ -182,12 +174,13 @@ class Deck:
     """All that is read of a model's mesh file: the model as its steps leave it that do not write matrices.
 
     path: name of the file. node_numbers (n,), ascending, coordinates (n, 3). All numbers in sets exist, each element is
-    once in one block. cut_faces: names of surfaces that are images of each other. centrifugal: loads of the last step
-    that has some. gravity (3,): acceleration of all elements in static steps. unassembled: places of what only matrices
-    of another program hold. n_instances: where there are several, numbers are not those of the file. skipped: places of
-    keywords that cannot change the model. notes: what was read in one of two ways, a sentence each. included: files
-    relative to the deck's folder. contact_nodes (n, 5): of a table of nodes, which has no elements: area, unit normal
-    out of the body, initial gap, NaN where none is given; None of a mesh.
+    once in one block. cyclic: number of sectors, and two points (2, 3) on the axis. cut_faces: names of surfaces that
+    are images of each other. centrifugal: loads of the last step that has some. gravity (3,): acceleration of all
+    elements in static steps. unassembled: places of what only matrices of another program hold. n_instances: where
+    there are several, numbers are not those of the file. skipped: places of keywords that cannot change the model.
+    notes: what was read in one of two ways, a sentence each. included: files relative to the deck's folder.
+    contact_nodes (n, 5): of a table of nodes, which has no elements: area, unit normal out of the body, initial gap,
+    NaN where none is given; None of a mesh.
     """
 
     path: str
@@ -199,7 +192,7 @@ class Deck:
     surfaces: Mapping[str, Surface] = field(default_factory=dict)
     ties: tuple[SurfacePair, ...] = ()
     contact_pairs: tuple[SurfacePair, ...] = ()
-    cyclic: CyclicSymmetry | None = None
+    cyclic: tuple[int, FloatArray] | None = None
     cut_faces: tuple[tuple[str, str], ...] = ()
     boundaries: tuple[NodalValue, ...] = ()
     transforms: tuple[Transform, ...] = ()

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from studies.fe_models.deck.contents import NODES_OF_KIND, CyclicSymmetry, Deck, Material, RigidMotion, SurfacePair
+from studies.fe_models.deck.contents import NODES_OF_KIND, Deck, Material, RigidMotion, SurfacePair
 from studies.fe_models.deck.keywords import Block
 from studies.fe_models.deck.mesh import Draft, Mesh, Records
 from studies.fe_models.deck.sets import NONE, Numbers
@@ -22,15 +22,6 @@ class MaterialRows:
 
     rows: dict[str, list[list[float]]] = field(default_factory=dict)
     places: dict[str, Place] = field(default_factory=dict)
-    problem: str = ""
-
-
-@dataclass
-class Interaction:
-    """Friction of an interaction; places where it glues, and of a law that is not read."""
-
-    friction: float | None = None
-    glued: str = ""
     problem: str = ""
 
 
@@ -54,14 +45,15 @@ class Model:
     """All that was read so far.
 
     fields: entries of the fields of the deck in the order of the file, by a key for those that may be replaced.
-    interaction, material: those that the next keywords are about. thermal: where temperatures and expansion stand.
-    coupling: a *COUPLING that does not say yet what it couples.
+    interactions: by name what they say of a `SurfacePair`, by its fields. interaction, material: those that the next
+    keywords are about. thermal: where temperatures and expansion stand. coupling: a *COUPLING that does not say yet
+    what it couples.
     """
 
     mesh: Mesh
     fields: dict[str, dict[Hashable, list[Any]]] = field(default_factory=dict)
-    interactions: dict[str, Interaction] = field(default_factory=dict)
-    interaction: Interaction | None = None
+    interactions: dict[str, dict[str, Any]] = field(default_factory=dict)
+    interaction: dict[str, Any] | None = None
     materials: dict[str, MaterialRows] = field(default_factory=dict)
     material: MaterialRows | None = None
     thermal: dict[str, Place] = field(default_factory=dict)
@@ -197,24 +189,25 @@ class Model:
         for names, interaction, glued, adjusted, place in pairs:
             if interaction and interaction not in self.interactions:
                 raise place.wrong(f"there is no interaction {shown(interaction)}", "define *SURFACE INTERACTION")
-            law = self.interactions.get(interaction, Interaction())
             if frozenset(names) not in apart:
                 (one, other), (fitted, clearance) = names, fits.get(frozenset(names), ("", None))
-                laws = law.friction, law.problem, glued or law.glued
-                yield SurfacePair(one, other, None, *laws, fitted, clearance, adjusted)
+                pair = SurfacePair(one, other, fitted=fitted, clearance=clearance, adjusted=adjusted)
+                law = self.interactions.get(interaction, {})
+                yield replace(pair, **law | ({"glued": glued} if glued else {}))
 
-    def _cyclic(self) -> CyclicSymmetry | None:
+    def _cyclic(self) -> tuple[int, FloatArray] | None:
         """Cyclic symmetry of one number of sectors and one axis, whose cut faces may be several ties."""
         ties = [name for name, cyclic, _ in self.get("ties") if cyclic]
-        first: CyclicSymmetry | None = None
+        first: tuple[int, FloatArray] | None = None
         for number, name, axis, place in self.get("cyclic"):
             if name and name not in ties:
                 raise place.wrong(f"there is no tie {shown(name)} of cut faces", "give *TIE, CYCLIC SYMMETRY this name")
-            first = first or CyclicSymmetry(number, axis)
-            own = (first.axis[1] - first.axis[0]) / np.linalg.norm(first.axis[1] - first.axis[0])
-            apart = np.cross(axis - first.axis[0], own) / np.linalg.norm(axis[1] - axis[0])
-            if number != first.n_sectors or np.abs(apart).max() > _SAME_AXIS or (axis[1] - axis[0]) @ own < 0:
-                what = f"{number} sectors, another one has {first.n_sectors}, or about other axes"
+            first = first or (number, axis)
+            n_sectors, (start, end) = first
+            own = (end - start) / np.linalg.norm(end - start)
+            apart = np.cross(axis - start, own) / np.linalg.norm(axis[1] - axis[0])
+            if number != n_sectors or np.abs(apart).max() > _SAME_AXIS or (axis[1] - axis[0]) @ own < 0:
+                what = f"{number} sectors, another one has {n_sectors}, or about other axes"
                 raise place.wrong(what, "give all of them one N and one axis: several stages are not supported")
         return first
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from studies.fe_models.deck.contents import CentrifugalLoad, NodalValue, Pressure, SurfacePair
 from studies.fe_models.deck.keywords import Block, Row, keyword, read_name, unit
-from studies.fe_models.deck.model import Interaction, Model, Step
+from studies.fe_models.deck.model import Model, Step
 from studies.fe_models.files import is_integer, read_float, shown
 
 PROCEDURES = (
@@ -73,7 +73,7 @@ def _contact_pair(model: Model, block: Block) -> None:
 @keyword("SURFACEINTERACTION", "NAME")
 def _interaction(model: Model, block: Block) -> None:
     """What follows is about it."""
-    model.interaction = model.interactions.setdefault(block.name("NAME"), Interaction())
+    model.interaction = model.interactions.setdefault(block.name("NAME"), {})
 
 
 @keyword("SURFACEBEHAVIOR", "PRESSURE-OVERCLOSURE", "PENALTY AUGMENTEDLAGRANGE DIRECT STIFFNESS")
@@ -83,7 +83,7 @@ def _behavior(model: Model, block: Block) -> None:
     if law == "LINEAR":
         model.notes.append(f"{block.place}, LINEAR is read as hard contact (see contact_stiffness).")
     glued = f"{block.place}, PRESSURE-OVERCLOSURE=TIED" if law == "TIED" else ""
-    block.below(model.interaction, "SURFACE INTERACTION").glued = glued
+    block.below(model.interaction, "SURFACE INTERACTION")["glued"] = glued
 
 
 @keyword("FRICTION", _ONE_COEFFICIENT, "SLIPTOLERANCE ELASTICSLIP LAGRANGE SHEARTRACTIONSLOPE")
@@ -96,8 +96,8 @@ def _friction(model: Model, block: Block) -> None:
     if min(values, default=0.0) < 0:
         raise block.place.wrong(f"a friction coefficient of {min(values):g}", "give one of at least 0")
     what = f" with {' and '.join(laws)}" if laws else " of several coefficients" if len(set(values)) > 1 else ""
-    interaction.problem = f"{block.place}{what} is not read" if what else ""
-    interaction.friction = None if what else values[0]
+    interaction["problem"] = f"{block.place}{what} is not read" if what else ""
+    interaction["friction_coefficient"] = None if what else values[0]
 
 
 @keyword("CLEARANCE", "MASTER SLAVE VALUE")

@@ -94,8 +94,8 @@ def find_axes(deck: Deck, parameters: Parameters, units: Units) -> tuple[Rotatio
     if given is not None:
         of_study = np.array(given.point), np.array(given.direction) / np.linalg.norm(given.direction)
     if deck.cyclic is not None:
-        n_sectors = n_sectors or deck.cyclic.n_sectors
-        start, end = deck.cyclic.axis * units.length
+        n_sectors = n_sectors or deck.cyclic[0]
+        start, end = deck.cyclic[1] * units.length
         of_sector = start, (end - start) / np.linalg.norm(end - start)
     missing = SceneError("axis", "missing", "give {point, direction} of the axis: the deck has none")
     if speed or (speed is None and own is not None):

@@ -6,15 +6,16 @@ follows here: one order of the rows, both triangles, and what cannot be.
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any, NoReturn, TextIO
 
 import numpy as np
 import pandas as pd
 import scipy.sparse as sp
 
 from solver.model_from_matrices import find_asymmetry
-from studies.fe_models.files import FloatArray, IntArray, library_errors, shown
+from studies.fe_models.files import FloatArray, IntArray, library_errors, shown, to_float
 from studies.scene_error import SceneError
 
 NAMES = ("stiffness", "mass", "damping", "load")
@@ -175,3 +176,20 @@ def _forces(entries: Entries, labels: IntArray) -> FloatArray:
     found = np.zeros((labels.size, cases.max(initial=0) + 1))
     np.add.at(found, (np.searchsorted(labels, rows), cases), entries.values[acting])
     return found
+
+
+def read_fixed(file: TextIO, length: int, form: tuple[str, str]) -> FloatArray:
+    """Numbers (length,) of fixed width in the next lines of a file. form: how many stand in a line, and their width.
+
+    Raises ValueError where some are missing.
+    """
+    each, width = int(form[0] or 1), int(form[1])
+    lines = list(islice(file, -(-length // each)))
+    fields = " ".join(lines).split()
+    if len(fields) != length:  # they touch; scipy writes narrower ones than it says
+        text = "".join(line.rstrip("\r\n").ljust(each * width) for line in lines)[: length * width]
+        fields = [text[at : at + width].strip() for at in range(0, len(text), width)]
+    values = np.array([to_float(field) for field in fields])
+    if len(values) < length or np.isnan(values).any():
+        raise ValueError(f"{length - np.count_nonzero(np.isfinite(values))} of {length} numbers are missing")
+    return values

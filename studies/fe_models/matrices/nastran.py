@@ -1,4 +1,4 @@
-"""Matrices of Nastran: DMIG entries of a punch file (`PARAM,EXTOUT,DMIGPCH`, or EXTSEOUT).
+"""Matrices of Nastran: DMIG entries of a punch file (`PARAM,EXTOUT,DMIGPCH`, or EXTSEOUT), and OP4 (OUTPUT4).
 
 KAAX is the stiffness, MAAX the mass, BAAX the viscous damping, PAX the forces.
 
@@ -6,20 +6,35 @@ DMIG: a header "DMIG, name, 0, form, type" comes first, then for every column "D
 fields an entry: node, component, real part, imaginary part. Lines have fields of 8 characters, with a star behind their
 first word of 16, or commas. The component 0 is a scalar point, as the modal coordinates of a superelement are.
 Components are along the axes of the basic system, unless a GRID names another one.
+
+OP4, binary or text with numbers of fixed width: a matrix begins with its number of columns and rows, form, type and
+name. A column follows as its number, the first row, the number of words, and the values. Where the first row is 0 the
+column is sparse and consists of strings, each with its own length and row: packed into one whole number, or as two
+where there are many rows (BIGMAT, a negative number of rows). A column behind the last one ends the matrix.
 """
 
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from io import BytesIO
 from pathlib import Path
+from typing import Any, TextIO
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy import sparse
 
-from studies.fe_models.files import check_file, shown, to_float
-from studies.fe_models.matrices.matrices import Entries, label, wrong
+from studies.fe_models.files import FloatArray, check_file, shown, to_float
+from studies.fe_models.matrices.matrices import Entries, entries_of_tables, label, read_fixed, wrong
 
 _USUAL = {"stiffness": "KAAX", "mass": "MAAX", "damping": "BAAX", "load": "PAX"}
 _CD = 5  # field of a GRID, counted behind its first word
 _AGAIN = "punch the matrices again, real and symmetric"
+_MANY_ROWS = 65536
+_SINGLE, _DOUBLE = 1, 2  # types of real matrices
+
+Column = tuple[list[int], Callable[[int], list[int]], Callable[[int], FloatArray]]
+"""Number, first row and words; what reads the next whole numbers, and what reads real ones in so many words."""
+Columns = Iterator[Column]
 
 
 def names_of_matrices(names: Iterable[str], file: str) -> dict[str, str]:
@@ -123,3 +138,106 @@ def _real(text: str) -> float:
     if math.isnan(value):
         raise ValueError(f"{text!r} in place of a number")
     return value
+
+
+def read_op4(files: Mapping[str, Path]) -> dict[str, Entries]:
+    """Entries of an OP4 file by the names of Nastran; the rows have a table. Raises SceneError about "matrices"."""
+    path = files["matrices"]
+    check_file(path)
+    found = {}
+    try:
+        with path.open("rb") as file:
+            binary = b"\0" in file.read(16)
+        for name, (n_columns, n_rows, _, kind), columns in _binary(path) if binary else _text(path):
+            if kind not in (_SINGLE, _DOUBLE):
+                raise ValueError(f"{name} is complex")
+            parts = list(_strings(n_columns, n_rows, columns))
+            rows = np.concatenate([[], *(row + np.arange(len(values)) - 1 for _, row, values in parts)])
+            places = np.repeat([column - 1 for column, *_ in parts], [len(values) for *_, values in parts])
+            values = np.concatenate([[], *(values for *_, values in parts)])
+            at = rows.astype(np.int64), places.astype(np.int64)
+            found[name] = sparse.coo_array((values, at), shape=(abs(n_rows), n_columns))
+    except (ValueError, TypeError, IndexError, OverflowError, StopIteration) as error:
+        wrong(path.name, f"no OP4 file, or damaged ({shown(str(error))})", "write it again: OUTPUT4 or EXTSEOUT")
+    names = names_of_matrices(found, path.name)
+    return entries_of_tables({name: found[own] for name, own in names.items()}, files)
+
+
+def _strings(n_columns: int, n_rows: int, columns: Columns) -> Iterator[tuple[int, int, FloatArray]]:
+    """Column and first row, from 1, and values of each string of numbers."""
+    for (column, row, words), whole, real in columns:
+        if column > n_columns:
+            return
+        while words > 0:
+            start, length, used = row, words, 0
+            if row <= 0 and 0 <= n_rows < _MANY_ROWS:
+                (packed,) = whole(1)
+                length, start, used = (packed >> 16) - 1, packed & 0xFFFF, 1
+            elif row <= 0:
+                length, start = whole(2)
+                length, used = length - 1, 2
+            if length <= 0:
+                raise ValueError("a string of no length")
+            yield column, start, real(length)
+            words -= length + used
+    raise ValueError("it ends too early")
+
+
+def _text(path: Path) -> Iterator[tuple[str, list[int], Columns]]:
+    with path.open(encoding="latin-1") as file:
+        while (head := file.readline()).strip():
+            sizes = [int(head[at : at + 8]) for at in range(0, 32, 8)]
+            name, form = head[32:40].strip().upper(), head[40:].upper().replace("D", "E").rpartition(",")[2].strip()
+            each, _, width = form.partition(".")[0].partition("E") if form else ("5", "", "16")
+            yield name, sizes, _text_columns(file, sizes[3], (each, width))
+            file.readline()  # a number in the column behind the last one
+
+
+def _text_columns(file: TextIO, kind: int, form: tuple[str, str]) -> Columns:
+    def whole(count: int) -> list[int]:
+        line = file.readline()
+        return [int(line)] if count == 1 else [int(line[:8]), int(line[8:16])]
+
+    while True:
+        head = file.readline()
+        column, row, words = (int(head[at : at + 8]) for at in range(0, 24, 8))
+        # of a column that is not sparse the numbers are counted, not their words
+        yield (
+            [column, row, words * (kind if row > 0 else 1)],
+            whole,
+            lambda words: read_fixed(file, words // kind, form),
+        )
+
+
+def _binary(path: Path) -> Iterator[tuple[str, list[int], Columns]]:
+    data = path.read_bytes()
+    order = "<" if data[0] else ">"
+    records = _records(data, order)
+    for record in records:
+        whole = np.dtype(f"{order}i{len(record) // 6}")  # four numbers and a name of two, of 4 bytes or of 8
+        name = record[4 * whole.itemsize :].decode("latin-1").replace("\0", " ").strip().upper()
+        sizes = np.frombuffer(record, whole, 4).tolist()
+        real = np.dtype(f"{order}f{8 if sizes[3] == _DOUBLE else whole.itemsize}")
+        yield name, sizes, (_binary_column(each, whole, real) for each in records)
+
+
+def _records(data: bytes, order: str) -> Iterator[bytes]:
+    """Records of an unformatted file of Fortran: each between its length."""
+    at = 0
+    while at < len(data):
+        length = int(np.frombuffer(data, f"{order}i4", 1, at)[0])
+        if length <= 0 or at + 8 + length > len(data):
+            raise ValueError("it ends too early")
+        yield data[at + 4 : at + 4 + length]
+        at += 8 + length
+
+
+def _binary_column(record: bytes, whole: np.dtype[Any], real: np.dtype[Any]) -> Column:
+    rest = BytesIO(record)
+
+    def take(kind: np.dtype[Any], words: int) -> NDArray[Any]:
+        size = words * whole.itemsize
+        return np.frombuffer(rest.read(size), kind, size // kind.itemsize)
+
+    head = take(whole, 3).tolist()
+    return head, lambda count: take(whole, count).tolist(), lambda words: take(real, words).astype(np.float64)

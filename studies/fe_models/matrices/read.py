@@ -12,6 +12,11 @@ which may be repeated, their dofs, and the upper triangle of each `*MATRIX` colu
 MATLAB (.mat), MatrixMarket and Harwell-Boeing files have no labels. Node and dof of each row, in the order of the rows,
 are the variable `rows` (n, 2) of a .mat file, or stand beside the files in job_rows.csv with the columns node and dof;
 dof 0 is a coordinate of no place, as of a mode, whose node may be 0 as well.
+
+Harwell-Boeing (.hb, and .rb of Rutherford-Boeing), a sparse matrix column by column in numbers of fixed width. Lines: a
+title; how many lines the file, pointers, rows, values and right-hand sides take; type, size and number of entries;
+formats of Fortran. Types are three letters: R or I for real or whole numbers; S where one triangle is written, U or R
+where all entries are; A for assembled. scipy reads U alone, and neither exponents with D nor fields that touch.
 """
 
 import re
@@ -20,21 +25,31 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from glob import escape
 from pathlib import Path
-from typing import Any
+from typing import Any, TextIO
 
 import h5py
 import numpy as np
 from scipy import io, sparse
 
 from studies.fe_models.files import check_file, library_errors, shown
-from studies.fe_models.matrices.fortran import read_harwell_boeing, read_op4
-from studies.fe_models.matrices.matrices import NAMES, Entries, Matrices, assemble, entries_of_tables, label, wrong
-from studies.fe_models.matrices.nastran import read_punch
+from studies.fe_models.matrices.matrices import (
+    NAMES,
+    Entries,
+    Matrices,
+    assemble,
+    entries_of_tables,
+    label,
+    read_fixed,
+    wrong,
+)
+from studies.fe_models.matrices.nastran import read_op4, read_punch
 from studies.scene_error import SceneError
 
 Files = Mapping[str, Path]
 """Files of a model by what is in them."""
 
+_FORMAT = re.compile(r"\((?:\d*P,?)?(\d*)\(?(?:ES|EN|[IEDFG])(\d+)(?:\.\d+(?:E\d+)?)?\)?\)")
+_TYPES = re.compile("[RI][SUR]A")
 _OF_TYPE = {"STIFFNESS": "stiffness", "MASS": "mass", "VISCOUSDAMPING": "damping"}
 
 
@@ -159,7 +174,7 @@ def _read_tables(files: Files) -> dict[str, Entries]:
     for name in [name for name in NAMES if name in files]:
         path = files[name]
         if path.suffix.lower() != ".mtx":
-            found[name] = read_harwell_boeing(path)
+            found[name] = _read_harwell_boeing(path)
             continue
         with library_errors(path, "scipy.io", "scipy", "matrices"):
             *_, field, symmetry = io.mminfo(path)
@@ -167,6 +182,34 @@ def _read_tables(files: Files) -> dict[str, Entries]:
                 wrong(path.name, f"its header says {field} {symmetry}", "write the numbers of a symmetric matrix")
             found[name] = io.mmread(path)
     return entries_of_tables(found, files)
+
+
+def _read_harwell_boeing(path: Path) -> sparse.coo_array:
+    """The entries of a file as they stand there, of a triangle where it has one. Raises SceneError about "matrices"."""
+    check_file(path)
+    try:
+        with path.open(encoding="latin-1") as file:
+            return _parse_harwell_boeing(path.name, file)
+    except SceneError:
+        raise
+    except (ValueError, IndexError, OverflowError) as error:
+        wrong(path.name, f"no Harwell-Boeing file, or damaged ({shown(str(error))})", "write it again")
+
+
+def _parse_harwell_boeing(name: str, file: TextIO) -> sparse.coo_array:
+    _, counts, (kind, *size), formats = [next(file, "").upper().split() for _ in range(4)]
+    n_rows, n_columns, n_entries = (int(text) for text in size[:3])
+    if not _TYPES.fullmatch(kind):
+        wrong(name, f"a matrix of type {shown(kind)}", "write a real symmetric one, assembled: RSA")
+    if any(int(count) for count in counts[4:]):
+        wrong(name, "right-hand sides beside the matrix", "write it without them, and the forces as job_load.hb")
+    forms = _FORMAT.findall("".join(formats))
+    if len(forms) < 3:
+        raise ValueError(f"formats {' '.join(formats)}")
+    lengths = (n_columns + 1, n_entries, n_entries)
+    starts, rows, values = (read_fixed(file, *each) for each in zip(lengths, forms, strict=False))
+    columns = np.repeat(np.arange(n_columns), np.diff(starts).astype(np.int64))
+    return sparse.coo_array((values, (rows.astype(np.int64) - 1, columns)), shape=(n_rows, n_columns))
 
 
 def _read_matlab(files: Files) -> dict[str, Entries]:
