@@ -78,8 +78,7 @@ def stuck_frequencies(model: ReducedModel) -> dict[int, FloatArray]:
 
 def lowest(frequencies: FloatArray) -> FloatArray:
     """The first N_MODES of ascending frequencies, NaN where there are fewer."""
-    own = frequencies[:N_MODES]
-    return np.append(own, np.full(N_MODES - len(own), np.nan))
+    return np.append(frequencies, np.full(N_MODES, np.nan))[:N_MODES]
 
 
 class Unit(str):

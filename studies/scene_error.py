@@ -45,5 +45,4 @@ def remedy_of(error: Mapping[str, Any]) -> str:
     """What would be right in place of a value that pydantic refuses, from one of the `errors()` of its exception."""
     if error["type"] in _KINDS:
         return _KINDS[error["type"]].format(**error.get("ctx", {}))
-    message = str(error["msg"]).removeprefix("Value error, ")
-    return message.replace("Input should be", "give").replace("'", '"').strip()
+    return str(error["msg"]).removeprefix("Value error, ").replace("Input should be", "give").replace("'", '"').strip()

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from studies.fe_models.deck.contents import Deck
 from studies.fe_models.deck.model import deck_of_arrays
 from studies.fe_models.files import FloatArray, IntArray, library_errors
+from studies.finite_element.solid_mesh import find_places
 from studies.scene_error import SceneError
 
 _SIZES = {1: (1, 2), 2: (2, 3), 3: (2, 4), 4: (3, 4), 5: (3, 8), 6: (3, 6), 7: (3, 5), 8: (1, 3), 9: (2, 6), 10: (2, 9)}
@@ -58,7 +59,9 @@ def read_gmsh(path: Path) -> Deck:
             physical = _entities(_numbers(sections[b"Entities"], binary)) if b"Entities" in sections else {}
             numbers, points = _nodes_41(_numbers(nodes, binary))
             blocks = [*_elements_41(_numbers(elements, binary), physical)]
-        blocks = [(kind, 1 + _places(numbers, nodes), groups) for kind, nodes, groups in blocks]
+        blocks = [(kind, 1 + find_places(nodes, numbers), groups) for kind, nodes, groups in blocks]
+        if any((nodes == 0).any() for _, nodes, _ in blocks):
+            raise ValueError("a node does not exist")
         named = re.findall(rb'(\d+)\s+(-?\d+)\s+"([^"]*)"', sections.get(b"PhysicalNames", b""))
         names = {(int(dim), int(tag)): name.decode(errors="replace") for dim, tag, name in named}
     return _deck(path.name, points, blocks, names)
@@ -96,15 +99,6 @@ def _n_nodes(kind: int) -> int:
     if kind not in _SIZES:
         raise _not_read(kind)
     return _SIZES[kind][1]
-
-
-def _places(numbers: IntArray, nodes: IntArray) -> IntArray:
-    """Where the nodes of elements are among all numbers. ValueError: one does not exist."""
-    order = np.argsort(numbers, kind="stable")
-    places = order[np.minimum(np.searchsorted(numbers[order], nodes), len(numbers) - 1)]
-    if (numbers[places] != nodes).any():
-        raise ValueError("a node does not exist")
-    return np.asarray(places)
 
 
 def _numbers(section: bytes, binary: bool) -> _Take:

@@ -29,8 +29,7 @@ def read_mesh_file(path: Path) -> Deck:
     numbered from 1 as they stand in the file; a physical group gives a set of its nodes, and one of volumes a set of
     its elements as well. Raises SceneError about "model".
     """
-    readers = {".inp": read_deck, ".msh": read_gmsh, ".cdb": read_cdb, ".csv": _read_node_table}
-    reader = readers.get(path.suffix.lower())
+    reader = {".inp": read_deck, ".msh": read_gmsh, ".cdb": read_cdb, ".csv": _read_node_table}.get(path.suffix.lower())
     if reader is None:
         raise SceneError("model", f"{path.name} is no mesh that is known", "give .inp, .msh, .cdb or .csv")
     return reader(path)

@@ -4,7 +4,7 @@ The static shapes of the relative displacements, and the lowest modes of the glu
 stiffness couples no mode with a shape. One factorisation of the glued stiffness at a nodal diameter gives both.
 """
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -154,17 +154,13 @@ def _projected(coordinates: sparse.csr_matrix, form: sparse.csr_matrix) -> spars
     return (coordinates.conj().T @ form @ coordinates).tocsr()
 
 
-def _parts(columns: Matrix) -> Iterator[slice]:
-    for first in range(0, columns.shape[1], _COLUMNS):
-        yield slice(first, first + _COLUMNS)
-
-
 def _static_shapes(coordinates: Coordinates, stiffness: sparse.csr_matrix, factor: Factor) -> Matrix:
     """Displacements (3 n_nodes, n_relative) under unit relative displacements, with no force elsewhere."""
     glued, relative = coordinates.glued, coordinates.relative
     forces = (glued.conj().T @ stiffness @ relative).tocsc()
     shapes = np.empty(relative.shape, dtype=forces.dtype)
-    for part in _parts(shapes):
+    for first in range(0, shapes.shape[1], _COLUMNS):
+        part = slice(first, first + _COLUMNS)
         shapes[:, part] = relative[:, part].toarray() - glued @ factor.solve(forces[:, part].toarray())
     return shapes
 
@@ -172,8 +168,8 @@ def _static_shapes(coordinates: Coordinates, stiffness: sparse.csr_matrix, facto
 def _on_shapes(form: sparse.csr_matrix, shapes: Matrix) -> Matrix:
     """`shapes^H form shapes` (n_relative, n_relative): its upper blocks are computed, the lower ones follow."""
     own: Matrix = np.empty_like(shapes, shape=(shapes.shape[1],) * 2)
-    for part in _parts(shapes):
-        before = slice(part.stop)
+    for first in range(0, len(own), _COLUMNS):
+        part, before = slice(first, first + _COLUMNS), slice(first + _COLUMNS)
         own[before, part] = shapes[:, before].conj().T @ (form @ shapes[:, part])
         own[part, before] = own[before, part].conj().T
     return own

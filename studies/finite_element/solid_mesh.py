@@ -87,6 +87,15 @@ class Rotation:
         return np.asarray(np.eye(3) - np.outer(self.axis, self.axis))
 
 
+def find_places(wanted: IntArray, numbers: IntArray) -> IntArray:
+    """Places of numbers, of any shape, among others (n,), the first of equal ones; -1 of those that are not there."""
+    if not len(numbers):
+        return np.full(np.shape(wanted), -1)
+    order = np.argsort(numbers, kind="stable")
+    places = order[np.minimum(np.searchsorted(numbers, wanted, sorter=order), len(numbers) - 1)]
+    return np.where(numbers[places] == wanted, places, -1)
+
+
 def rigid_motions(points: FloatArray) -> FloatArray:
     """Motions (n, 3, 6) of points (n, 3), m, as one body: three translations, m, and turns about the axes, rad."""
     turns = np.swapaxes(np.cross(np.eye(3), points[:, None]), 1, 2)

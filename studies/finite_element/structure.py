@@ -210,8 +210,7 @@ def _check_followers(
     if ties is not None:
         ways.append((ties.moving, "is tied", remedy))
     if cut is not None:
-        both = np.concatenate([cut.left, cut.right])
-        ways.append((both, "is on a cut face", "let other nodes depend on this one"))
+        ways.append((np.concatenate([cut.left, cut.right]), "is on a cut face", "let other nodes depend on this one"))
     for nodes, what, remedy in ways:
         wrong = nodes[constraints.dependent[nodes].any(axis=1)]
         if len(wrong):

@@ -13,7 +13,7 @@ from scipy import sparse
 
 from solver.model import BoolArray, FloatArray, IntArray
 from studies.finite_element.elements import CORNERS, ELEMENT_KINDS, HEX_8, HEX_20, TET_4, TET_10, ReferenceElement
-from studies.finite_element.solid_mesh import SolidMesh
+from studies.finite_element.solid_mesh import SolidMesh, find_places
 from studies.scene import SurfaceMesh
 from studies.scene_error import SceneError
 
@@ -134,15 +134,13 @@ def faces_of_elements(mesh: SolidMesh, name: str, elements: IntArray, faces: Int
     left = np.ones(len(elements), dtype=np.bool_)
     for group in mesh.groups:
         table = ELEMENT_KINDS[group.kind].faces
-        order = np.argsort(group.numbers)
-        place = np.minimum(np.searchsorted(group.numbers, elements, sorter=order), len(order) - 1)
-        own = group.numbers[order[place]] == elements
-        left &= ~own
-        for chosen in np.flatnonzero(own):
+        place = find_places(elements, group.numbers)
+        left &= place < 0
+        for chosen in np.flatnonzero(place >= 0):
             if not 1 <= faces[chosen] <= len(table):
                 wrong = f"surface {name} names face S{faces[chosen]} of element {elements[chosen]} ({group.kind})"
                 raise SceneError("contact", wrong, f"give faces S1 to S{len(table)}")
-            element = group.nodes[order[place[chosen]]]
+            element = group.nodes[place[chosen]]
             found.append(Face(element[list(table[faces[chosen] - 1])], element, group.part))
     if left.any():
         raise SceneError("contact", f"surface {name} names element {elements[left][0]}", "there is no such element")

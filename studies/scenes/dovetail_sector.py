@@ -106,8 +106,7 @@ class Parameters(SectorParameters):
         yield low, "flank_length", remedy
         yield bottom_half_width <= self.root_clearance, "root_clearance", "make it smaller than the root"
         wide = bottom_half_width >= 0.9 * self.slot_bottom_radius * sin(self.half_pitch)
-        remedy = "shorten the flanks or use fewer sectors, so that a post is left between two slots"
-        yield wide, "flank_length", remedy
+        yield wide, "flank_length", "shorten the flanks or use fewer sectors, so that a post is left between two slots"
         none = neck + self.platform_gap >= self.platform_radius * tan(self.half_pitch)
         yield none, "platform_gap", "make it smaller, the platform vanishes"
         none = neck + self.mouth_clearance >= self.rim_radius * sin(self.half_pitch)
@@ -188,8 +187,7 @@ def _disk_blocks(p: Parameters) -> list[FloatArray]:
         (p.flank_top_radius, p.flank_top_half_width),
         (sqrt(p.rim_radius**2 - mouth_y**2), mouth_y),
     ]
-    spans = [m, m, m]
-    wall_x, wall_y = (graded([point[axis] for point in wall], spans) for axis in (0, 1))
+    wall_x, wall_y = (graded([point[axis] for point in wall], [m, m, m]) for axis in (0, 1))
     post_angles = np.stack([np.linspace(atan2(y, x), p.half_pitch, m + 1) for x, y in zip(wall_x, wall_y, strict=True)])
     post_radii = np.array([hypot(x, y) for x, y in zip(wall_x, wall_y, strict=True)])
     radii = graded(

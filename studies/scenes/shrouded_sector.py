@@ -56,8 +56,7 @@ class Parameters(SectorParameters):
     def impossible(self) -> Iterator[tuple[bool, str, str]]:  # noqa: D102
         yield from super().impossible()
         wide = self._blade_half_angle(self.rim_radius, self.root_angle) > 0.9 * self.half_pitch
-        remedy = "make it thinner, or use fewer blades, so that there is room between the blades"
-        yield wide, "blade_thickness", remedy
+        yield wide, "blade_thickness", "make it thinner, or use fewer blades, so that there is room between the blades"
 
     def _blade_half_angle(self, radius: float, angle: float) -> float:
         """Half of the thickness of the blade as an angle about the axis, rad; angle: to the axis, degrees."""

@@ -7,7 +7,7 @@ mass 1. Mass 2 may stick while mass 1 moves.
 import numpy as np
 from pydantic import Field
 
-from solver.model import FloatArray, ReducedModel
+from solver.model import ReducedModel
 from solver.model_from_matrices import build_model
 from studies.scene import Damping, Kilogram, Newton, NewtonPerMetre, Scene, SquareMetre
 
@@ -26,10 +26,12 @@ class Parameters(Scene):
 
     def build(self, _: int) -> ReducedModel:
         """In the displacements of mass 1 and mass 2, both of which are responses."""
+        pairs = (self.damping_1, self.damping_2), (self.stiffness_1, self.stiffness_2)
+        damping, stiffness = ([[ground + between, -between], [-between, between]] for ground, between in pairs)
         return build_model(
             np.diag([self.mass_1, self.mass_2]),
-            _chain(self.damping_1, self.damping_2),
-            _chain(self.stiffness_1, self.stiffness_2),
+            damping,
+            stiffness,
             [[-1, 1, -1]],
             self.area,
             load_harmonic=[1.0, 0.0],
@@ -37,7 +39,3 @@ class Parameters(Scene):
             surface=("support",),
             response_names=("mass_1", "mass_2"),
         )
-
-
-def _chain(to_ground: float, between: float) -> FloatArray:
-    return np.array([[to_ground + between, -between], [-between, between]])

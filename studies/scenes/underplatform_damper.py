@@ -109,8 +109,7 @@ class Parameters(SectorParameters):
         disk = graded([self.bore_radius, self.rim_radius], [4 * m])
         between = graded([self.rim_radius, self.platform_radius], [2 * m])
         blade = graded([top, top + self.blade_length], [8 * m])
-        stations = [-half + edge, -half + side, -shank, shank, half - side, half - edge]
-        platform = graded(stations, [m, m, 1, m, m])
+        platform = graded([-half + edge, -half + side, -shank, shank, half - side, half - edge], [m, m, 1, m, m])
         rise = np.clip(np.abs(platform) - (half - side), 0.0, None) / (side - edge) * self.roof_rise
         underside = self.platform_radius + rise
         share = np.linspace(0.0, 1.0, m + 1)[:, None]

@@ -7,7 +7,7 @@ import numpy as np
 
 from studies.fe_models.deck.contents import NODES_OF_KIND, ElementBlock, Surface
 from studies.fe_models.deck.keywords import Block, Reference
-from studies.fe_models.deck.sets import NONE, Key, Resolver, Sets, exist, find_key
+from studies.fe_models.deck.sets import NONE, Key, Resolver, Sets, find_key
 from studies.fe_models.files import LARGEST_NUMBER, FloatArray, IntArray, Place, shown
 from studies.finite_element.elements import ELEMENT_KINDS
 from studies.scene_error import SceneError
@@ -205,7 +205,7 @@ def _build_blocks(draft: Draft, offsets: Mapping[str, int], nodes: IntArray) -> 
     kinds: dict[str, list[tuple[IntArray, IntArray]]] = {}
     for each in draft.elements:
         used = each.values.astype(np.int64) + offsets[each.scope]
-        missing = ~exist(used, nodes)
+        missing = ~np.isin(used, nodes)
         if missing.any():
             row, column = np.argwhere(missing)[0]
             found = f"element {each.numbers[row]} has the node {each.values[row, column]}, which does not exist"

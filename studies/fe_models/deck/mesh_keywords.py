@@ -11,6 +11,7 @@ from studies.fe_models.deck.mesh import Draft, Records
 from studies.fe_models.deck.sets import NONE, Numbers, Resolver
 from studies.fe_models.files import LARGEST_NUMBER, FloatArray, IntArray, Place, is_integer, read_integer, shown
 from studies.finite_element.cut_faces import turn_about
+from studies.finite_element.solid_mesh import find_places
 
 OTHER_KINDS = {
     "MASS": 1,
@@ -204,8 +205,7 @@ def _ncopy(draft: Draft, block: Block) -> None:
         raise block.place.wrong("a copy without SHIFT", "give the nodes of copies that are mirrored or scaled")
     (change,) = _whole_numbers([block.parameters.get("CHANGENUMBER", "")], block.place, (0,))
     numbers, (shift, turn) = _members(draft, block.reference("OLDSET")), _placement(block)
-    points = _coordinates(draft, block, numbers) @ turn.T + shift
-    _add(draft, block, numbers + change, points)
+    _add(draft, block, numbers + change, _coordinates(draft, block, numbers) @ turn.T + shift)
 
 
 @keyword("ELGEN", "ELSET", of_mesh=True)
@@ -264,12 +264,10 @@ def _members(draft: Draft, reference: Reference, *, of_elements: bool = False) -
 def _coordinates(draft: Draft, block: Block, wanted: IntArray) -> FloatArray:
     """Coordinates (m, 3) of nodes by their numbers (m,). Raises SceneError where one does not exist."""
     own = [each for each in draft.nodes if each.scope == block.scope]
-    numbers = np.concatenate([NONE, *(each.numbers for each in own)])
-    missing = np.setdiff1d(wanted, numbers)
-    if missing.size:
-        raise block.place.wrong(f"there is no node {missing[0]}", "define it above this line")
-    order = np.argsort(numbers, kind="stable")
-    return np.concatenate([each.values for each in own])[order[np.searchsorted(numbers[order], wanted)]]
+    places = find_places(wanted, np.concatenate([NONE, *(each.numbers for each in own)]))
+    if (places < 0).any():
+        raise block.place.wrong(f"there is no node {wanted[places < 0].min()}", "define it above this line")
+    return np.concatenate([each.values for each in own])[places]
 
 
 def _add(

@@ -137,8 +137,7 @@ def _equations(model: Model, terms: list[Row], place: Place) -> Iterator[Equatio
     if len(nodes[0]) != count or any(len(each) not in (1, count) for each in nodes):
         raise place.wrong("sets of different sizes", "give sets of as many nodes as the first one, or one node")
     for row in range(count):
-        own = np.array([each[min(row, len(each) - 1)] for each in nodes])
-        yield Equation(str(place), own, dofs, values)
+        yield Equation(str(place), np.array([each[min(row, len(each) - 1)] for each in nodes]), dofs, values)
 
 
 @keyword("MPC")

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from studies.fe_models.deck.keywords import Reference
-from studies.fe_models.files import BoolArray, IntArray, Place, is_integer, read_integer, shown
+from studies.fe_models.files import IntArray, Place, is_integer, read_integer, shown
 
 NONE = np.empty(0, dtype=np.int64)
 """No numbers."""
@@ -65,11 +65,6 @@ def find_key(items: Container[Key], instances: Mapping[str, object], reference: 
         remedy = f"write {found[0]}.{shown(key[1])} or {found[1]}.{shown(key[1])}"
         raise reference.place.wrong(f"{len(found)} instances have {shown(key[1])}", remedy)
     return (found[0], key[1]) if found else None
-
-
-def exist(numbers: IntArray, existing: IntArray) -> BoolArray:
-    """Whether numbers, of any shape, are among others (n,), ascending, at least one."""
-    return np.asarray(existing[np.minimum(np.searchsorted(existing, numbers), existing.size - 1)] == numbers)
 
 
 @dataclass
@@ -138,7 +133,7 @@ class Resolver:
             first, last = np.searchsorted(self.existing, (numbers.min(), min(numbers.max(), last_of_scope) + 1))
             within = self.existing[first:last]
             return np.asarray(within[(within - numbers[0]) % abs(members.step) == 0])
-        there = exist(numbers, self.existing) & (numbers <= last_of_scope)
+        there = np.isin(numbers, self.existing) & (numbers <= last_of_scope)
         if not there.all():
             missing, what = members.numbers[~there], self.sets.what
             self.notes.append(f"{where}: {missing.size} of its {what} do not exist, the first is {missing[0]}.")

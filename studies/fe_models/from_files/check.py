@@ -128,8 +128,7 @@ def _sliding_frequencies(linear: LinearModel, model: ReducedModel) -> FloatArray
     # s from the lowest glued mode, the first of those behind the relative displacements.
     shift = float(np.diag(linear.stiffness)[np.count_nonzero(model.contact.dofs >= 0)].real)
     inverse = eigh(mass, stiffness + shift * mass, eigvals_only=True)[::-1]
-    squares = 1.0 / inverse[inverse > 0.0] - shift
-    return np.asarray(np.sqrt(np.maximum(squares, 0.0)) / (2.0 * np.pi))
+    return np.asarray(np.sqrt(np.maximum(1.0 / inverse[inverse > 0.0] - shift, 0.0)) / (2.0 * np.pi))
 
 
 def _reduction_error(loaded: LoadedModel, scene: FeScene) -> str:

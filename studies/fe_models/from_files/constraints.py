@@ -114,8 +114,7 @@ class _Builder:
 
     def _turn(self, motion: RigidMotion) -> int:
         """Row of the rotations of a reference node."""
-        kind = "" if motion.rotation else "turn"
-        return self._row(motion.rotation or motion.reference, motion.place, kind)
+        return self._row(motion.rotation or motion.reference, motion.place, "" if motion.rotation else "turn")
 
     def _rigid(self, motion: RigidMotion) -> None:
         """`u = u_reference + theta x arm` for each node."""

@@ -21,7 +21,7 @@ from studies.fe_models.matrices.matrices import Matrices, number_modes
 from studies.fe_models.matrices.read import read_matrices
 from studies.finite_element.elements import ELEMENT_KINDS
 from studies.finite_element.pairing import Contacts
-from studies.finite_element.solid_mesh import Rotation, SolidMesh, volumes_of_points
+from studies.finite_element.solid_mesh import Rotation, SolidMesh, find_places, volumes_of_points
 from studies.scene_error import SceneError
 
 _PAIR, _CONTACT = "add *MODEL CHANGE,TYPE=CONTACT PAIR,REMOVE and the pair", "remove the contact between them"
@@ -66,8 +66,7 @@ def order_by_nodes(matrices: Matrices, units: Units, mesh: SolidMesh, held: floa
     node[other], direction[other] = first - np.arange(len(other)) // 3, np.arange(len(other)) % 3
     extra = np.setdiff1d(node, numbers)
     everything = np.concatenate([numbers, extra]).astype(np.int64)
-    order = np.argsort(everything)
-    place = 3 * order[np.searchsorted(everything, node, sorter=order)] + direction
+    place = 3 * find_places(node, everything) + direction
     n = 3 * len(everything)
     missing = np.ones(n, dtype=np.bool_)
     missing[place] = False

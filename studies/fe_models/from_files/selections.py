@@ -168,8 +168,7 @@ def _released(tie: ContactSurfaces, contacts: Sequence[ContactSurfaces], *, of_d
         for first, second in ((each.first, each.second), (each.second, each.first)):
             sides = (tie.first, first), (tie.second, second)
             common = min(_common_facets(one, other) for one, other in sides)
-            same = all(np.array_equal(one.nodes, other.nodes) for one, other in sides)
-            if common and same and not of_deck:
+            if common and not of_deck and all(np.array_equal(one.nodes, other.nodes) for one, other in sides):
                 return True
             if common:
                 found = f"{tie.name} is glued, and {each.name} in contact has {common} of its facets"
@@ -180,8 +179,7 @@ def _released(tie: ContactSurfaces, contacts: Sequence[ContactSurfaces], *, of_d
 
 def _common_facets(one: Surface, other: Surface) -> int:
     """How many facets are in both surfaces."""
-    own, others = (np.unique(np.sort(each.facets, axis=1), axis=0) for each in (one, other))
-    return len(own) + len(others) - len(np.unique(np.concatenate([own, others]), axis=0))
+    return len(set.intersection(*({*map(tuple, np.sort(each.facets, axis=1).tolist())} for each in (one, other))))
 
 
 def _same(one: SurfacePair, other: SurfacePair) -> bool:

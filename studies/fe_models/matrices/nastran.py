@@ -159,8 +159,7 @@ def read_op4(files: Mapping[str, Path]) -> dict[str, Entries]:
             found[name] = sparse.coo_array((values, at), shape=(abs(n_rows), n_columns))
     except (ValueError, TypeError, IndexError, OverflowError, StopIteration) as error:
         wrong(path.name, f"no OP4 file, or damaged ({shown(str(error))})", "write it again: OUTPUT4 or EXTSEOUT")
-    names = names_of_matrices(found, path.name)
-    return entries_of_tables({name: found[own] for name, own in names.items()}, files)
+    return entries_of_tables({name: found[own] for name, own in names_of_matrices(found, path.name).items()}, files)
 
 
 def _strings(n_columns: int, n_rows: int, columns: Columns) -> Iterator[tuple[int, int, FloatArray]]:

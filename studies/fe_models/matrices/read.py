@@ -264,9 +264,8 @@ def _read_ansys(files: Files) -> dict[str, Entries]:
     free = np.flatnonzero(~np.isin(label(node, direction + 1, path.name), label(held, fixed + 1, path.name)))
     if not free.size:
         wrong(path.name, "no dof that is free", "write the file of the unconstrained bodies")
-    found = {"stiffness": stiffness, "mass": mass}
-    own = {name: matrix.tocsr()[free][:, free] for name, matrix in found.items()}
-    return entries_of_tables(own, files, np.stack([node, direction + 1])[:, free])
+    found = {"stiffness": stiffness.tocsr()[free][:, free], "mass": mass.tocsr()[free][:, free]}
+    return entries_of_tables(found, files, np.stack([node, direction + 1])[:, free])
 
 
 @dataclass(frozen=True)
@@ -303,8 +302,7 @@ def _find(path: Path) -> tuple[_Format, dict[str, Path]]:
     """The format of the matrices, and their files by what is in them."""
     for each in FORMATS:
         for end in set(each.ends.values()) - set(_ROWS.values()):
-            pattern = "(.*)" + re.escape(end).replace(r"\*", r"(\d+)")
-            if match := re.fullmatch(pattern, path.name, re.IGNORECASE):
+            if match := re.fullmatch("(.*)" + re.escape(end).replace(r"\*", r"(\d+)"), path.name, re.IGNORECASE):
                 job, number = match[1], match[match.re.groups]
                 files = {part: path.with_name(job + name.replace("*", number)) for part, name in each.ends.items()}
                 may_miss = ("damping", "load", "rows")
