@@ -125,14 +125,18 @@ def describe_field(field: FieldInfo) -> str:
     return "; ".join(filter(None, (meaning, said_of(field, Remark))))
 
 
-class Scene(BaseModel):
+class Table(BaseModel):
+    """A table: frozen, unknown keys are errors."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class Scene(Table):
     """Parameters of a bundled scene, and what follows from them. Units are metadata of the keys.
 
     FRICTION_IN_MODEL: whether the reduced model depends on the friction coefficient. OFFERS: what a study may ask for
     among `outputs.variables` that not every scene knows: "mesh", "exact" (a method `exact_answer`).
     """
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
     FRICTION_IN_MODEL: ClassVar[bool] = False
     OFFERS: ClassVar[tuple[str, ...]] = ()

@@ -73,8 +73,8 @@ class Mesh:
         kinds = np.repeat([block.kind for block in self.blocks], [block.numbers.size for block in self.blocks])
         order = np.argsort(elements)
         self._kinds = kinds[order]
-        self.elements = Resolver(draft.element_sets, elements[order], self.offsets, "EALL")
-        self.nodes = Resolver(draft.node_sets, self.numbers, self.offsets, "NALL", self.nodes_of)
+        self.elements = Resolver(draft.element_sets, elements[order], self.offsets)
+        self.nodes = Resolver(draft.node_sets, self.numbers, self.offsets, self.nodes_of)
         # sets first: their errors are about the lines where they are defined
         self.element_sets, self.node_sets = self._sets(self.elements), self._sets(self.nodes)
         self._faces_left = _MOST_FACES

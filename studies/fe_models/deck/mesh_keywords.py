@@ -258,7 +258,7 @@ def _members(draft: Draft, reference: Reference, *, of_elements: bool = False) -
     if (reference.scope, reference.target) in sets.unsorted and not of_elements:
         raise reference.place.wrong(f"the set {reference.target} is UNSORTED", "give sets by ascending numbers here")
     known = np.concatenate([NONE, *(each.numbers for each in records if each.scope == reference.scope)])
-    return Resolver(sets, np.unique(known), {reference.scope: 0}, "EALL" if of_elements else "NALL")(reference)
+    return Resolver(sets, np.unique(known), {reference.scope: 0})(reference)
 
 
 def _coordinates(draft: Draft, block: Block, wanted: IntArray) -> FloatArray:

@@ -72,14 +72,13 @@ class Resolver:
     """Sets as numbers that exist.
 
     existing: (n,) all numbers that exist, ascending. offsets: of every scope, what is added to its numbers; those of
-    one scope are smaller than the difference to the next. everything: the name that the code gives to all of them.
-    nodes_of: the nodes of a set of elements. notes: what is named and does not exist.
+    one scope are smaller than the difference to the next. nodes_of: the nodes of a set of elements. notes: what is
+    named and does not exist.
     """
 
     sets: Sets
     existing: IntArray
     offsets: Mapping[str, int]
-    everything: str
     nodes_of: Callable[[Reference], IntArray] = lambda _: NONE
     notes: list[str] = field(default_factory=list)
     _done: dict[Key, IntArray] = field(default_factory=dict)
@@ -94,7 +93,7 @@ class Resolver:
         key = self.key(reference)
         if key is not None:
             return self.members(key, reference.place)
-        if target == self.everything:
+        if target == f"{self.sets.what[0].upper()}ALL":  # NALL, EALL: the names that CalculiX gives to all of them
             return self.existing
         what = f"there is no set of {self.sets.what} {shown(target)}"
         raise reference.place.wrong(what, "define it, or remove it here")

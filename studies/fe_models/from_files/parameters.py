@@ -3,9 +3,9 @@
 import math
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import AfterValidator, BeforeValidator, Field
 
-from studies.scene import ContactStiffness, Density, Metre, Newton, NewtonPerMetre, Pascal, Remark, Rpm, Unit
+from studies.scene import ContactStiffness, Density, Metre, Newton, NewtonPerMetre, Pascal, Remark, Rpm, Table, Unit
 
 
 def _as_tuple(value: object) -> object:
@@ -24,12 +24,6 @@ Direction = Annotated[Vector, AfterValidator(_with_length)]
 Pair = Annotated[tuple[str, str], BeforeValidator(_as_tuple)]
 Pairs = Annotated[tuple[Pair, ...], BeforeValidator(_as_tuple)]
 Names = Annotated[tuple[str, ...], BeforeValidator(_as_tuple)]
-
-
-class Table(BaseModel):
-    """A table: frozen, unknown keys are errors."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 class SetDirection(Table):
