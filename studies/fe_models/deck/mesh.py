@@ -104,8 +104,7 @@ class Mesh:
     def ordered(self, reference: Reference) -> IntArray:
         """Nodes of a set or number in the order that counts in equations."""
         found = self.nodes(reference)
-        unsorted = found.size > 1 and self.nodes.key(reference) in self.draft.node_sets.unsorted
-        if unsorted or not found.size:
+        if not found.size or (found.size > 1 and self.nodes.key(reference) in self.draft.node_sets.unsorted):
             what = f"the set {shown(reference.target)} is UNSORTED, or has no node"
             raise reference.place.wrong(what, "give nodes that exist, one by one")
         return found

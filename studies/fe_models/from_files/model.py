@@ -206,9 +206,8 @@ def _motion(selections: Selections, given: SetDirection, key: str, n_nodes: int)
 def _retainer(parameters: Parameters, axis: FloatArray | None, rotation: Rotation | None) -> Retainer | None:
     if parameters.retention_stiffness == 0.0:
         return None
-    direction: object = parameters.retention_direction
-    if direction is None:
-        direction = axis if axis is not None or rotation is None else rotation.axis
+    of_model = axis if axis is not None or rotation is None else rotation.axis
+    direction = of_model if parameters.retention_direction is None else parameters.retention_direction
     if direction is None:
         raise SceneError("retention_direction", "missing", "give it: the model has no axis")
     return Retainer(parameters.retention_stiffness, np.array(direction))

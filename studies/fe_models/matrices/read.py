@@ -25,7 +25,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from glob import escape
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 import h5py
 import numpy as np
@@ -189,27 +189,24 @@ def _read_harwell_boeing(path: Path) -> sparse.coo_array:
     check_file(path)
     try:
         with path.open(encoding="latin-1") as file:
-            return _parse_harwell_boeing(path.name, file)
+            _, counts, (kind, *size), formats = [next(file, "").upper().split() for _ in range(4)]
+            n_rows, n_columns, n_entries = (int(text) for text in size[:3])
+            if not _TYPES.fullmatch(kind):
+                wrong(path.name, f"a matrix of type {shown(kind)}", "write a real symmetric one, assembled: RSA")
+            if any(int(count) for count in counts[4:]):
+                remedy = "write it without them, and the forces as job_load.hb"
+                wrong(path.name, "right-hand sides beside the matrix", remedy)
+            forms = _FORMAT.findall("".join(formats))
+            if len(forms) < 3:
+                raise ValueError(f"formats {' '.join(formats)}")
+            lengths = (n_columns + 1, n_entries, n_entries)
+            starts, rows, values = (read_fixed(file, *each) for each in zip(lengths, forms, strict=False))
+        columns = np.repeat(np.arange(n_columns), np.diff(starts).astype(np.int64))
+        return sparse.coo_array((values, (rows.astype(np.int64) - 1, columns)), shape=(n_rows, n_columns))
     except SceneError:
         raise
     except (ValueError, IndexError, OverflowError) as error:
         wrong(path.name, f"no Harwell-Boeing file, or damaged ({shown(str(error))})", "write it again")
-
-
-def _parse_harwell_boeing(name: str, file: TextIO) -> sparse.coo_array:
-    _, counts, (kind, *size), formats = [next(file, "").upper().split() for _ in range(4)]
-    n_rows, n_columns, n_entries = (int(text) for text in size[:3])
-    if not _TYPES.fullmatch(kind):
-        wrong(name, f"a matrix of type {shown(kind)}", "write a real symmetric one, assembled: RSA")
-    if any(int(count) for count in counts[4:]):
-        wrong(name, "right-hand sides beside the matrix", "write it without them, and the forces as job_load.hb")
-    forms = _FORMAT.findall("".join(formats))
-    if len(forms) < 3:
-        raise ValueError(f"formats {' '.join(formats)}")
-    lengths = (n_columns + 1, n_entries, n_entries)
-    starts, rows, values = (read_fixed(file, *each) for each in zip(lengths, forms, strict=False))
-    columns = np.repeat(np.arange(n_columns), np.diff(starts).astype(np.int64))
-    return sparse.coo_array((values, (rows.astype(np.int64) - 1, columns)), shape=(n_rows, n_columns))
 
 
 def _read_matlab(files: Files) -> dict[str, Entries]:
