@@ -21,9 +21,7 @@ _WIDER = 1.0 / 6.0
 """Of its width: by this much strips of uniform traction are wider, at each end, than the flat punch that they bear as.
 Measured: the area worn in the end is then within 0.2 % with 8 to 128 strips in half of the stick zone, with 0 it is 13
 to 0.9 % off, of first order."""
-
-_WIDEST = 0.45
-"""Of the depth that displacements refer to: half of the width of all strips has to be below a half of it."""
+_WIDEST = 0.45  # of the depth that displacements refer to: half of the width of all strips has to be below a half of it
 
 
 def line_worn_depth(x: FloatArray, radius: float, half_width: float, stick_width: float) -> FloatArray:

@@ -23,8 +23,7 @@ from studies.scene_error import SceneError
 
 _FARTHEST = 20.0  # of the contact: beyond what slip up to 0.9999 of sliding wears
 _HOLDER = 1e-9  # stiffness that holds the body over that of the contact: no result changes by more
-_SHEAR = 3e-4
-"""Of a sliding that is prescribed: by so much the bodies still shear. Measured: with 3e-7 a history is uncertain."""
+_SHEAR = 3e-4  # of a prescribed sliding: the bodies still shear by it. Measured: with 3e-7 a history is uncertain
 _MARGIN = 1.1
 """Over b from volume and unworn contact, `b^3 = a^3 + 3 R A / 2` or `b^4 = a^4 + 4 R V / pi`. Measured with uniform
 slip: up to 5 a the scar is 0.93 to 1.041 times that wide; from the depth, `b^2 = a^2 + 2 R W`, 0.90 to 1.012 times."""

@@ -17,11 +17,8 @@ from studies.scenes.half_space import PressedBody, patch_compliance, worn_edge
 _WIDER = 0.11
 """Of the width of a patch: by so much the circle of equal area is wider than the punch that stuck patches bear as.
 Measured: with 20 patches depth and volume worn in the end are then within 2 and 1 %."""
-_NEAR = 0.08
-"""Relative change of the width of the patches within which one is looked for whose stuck patches are round."""
-
-_WIDEST = 0.5
-"""Of the radius of the sphere: beyond it is no paraboloid."""
+_NEAR = 0.08  # relative change of the width of the patches within which one is looked for whose stuck patches are round
+_WIDEST = 0.5  # of the radius of the sphere: beyond it is no paraboloid
 
 
 def point_worn_depth(r: FloatArray, radius: float, contact_radius: float, stick_radius: float) -> FloatArray:
