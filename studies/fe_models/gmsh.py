@@ -146,9 +146,8 @@ def _elements_22(section: bytes, binary: bool) -> Iterator[_Block]:
     else:
         lines = [line.split() for line in rest.splitlines()][: int(count)]
         for (kind, n_tags), rows in groupby(lines, lambda row: (int(row[1]), int(row[2]))):
-            parts.append(
-                (kind, n_tags, np.delete(np.array([*rows], dtype=np.float64), (1, 2), axis=1).astype(np.int64))
-            )
+            table = np.delete(np.array([*rows], dtype=np.float64), (1, 2), axis=1)
+            parts.append((kind, n_tags, table.astype(np.int64)))
     for kind, same in groupby(parts, lambda part: part[0]):
         found = [(each[:, 1] if n_tags else 0 * each[:, 0], each[:, 1 + n_tags :]) for _, n_tags, each in same]
         physical, nodes = (np.concatenate(each) for each in zip(*found, strict=True))

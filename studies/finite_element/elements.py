@@ -102,9 +102,7 @@ def _wedge_rule(triangle: FloatArray, area_weight: float, n_points: int) -> Quad
 _GAUSS, _WEIGHTS = np.polynomial.legendre.leggauss(3)
 _INNER = (5.0 - np.sqrt(5.0)) / 20.0
 _HEX_8_POINTS = Quadrature(CORNERS / np.sqrt(3.0), np.ones(8))
-_HEX_27_POINTS = Quadrature(
-    np.array(list(product(_GAUSS, repeat=3))), np.einsum("i,j,k->ijk", _WEIGHTS, _WEIGHTS, _WEIGHTS).ravel()
-)
+_HEX_27_POINTS = Quadrature(np.array([*product(_GAUSS, repeat=3)]), np.einsum("i,j,k->ijk", *[_WEIGHTS] * 3).ravel())
 _WEDGE_2_POINTS = _wedge_rule(np.array([[1.0, 1.0]]) / 3.0, 0.5, 2)
 _WEDGE_9_POINTS = _wedge_rule(np.array([[1.0, 1.0], [4.0, 1.0], [1.0, 4.0]]) / 6.0, 1.0 / 6.0, 3)
 _TET_1_POINT = Quadrature(np.full((1, 3), 0.25), np.array([1.0 / 6.0]))

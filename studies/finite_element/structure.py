@@ -294,13 +294,10 @@ def _hold_pairs(
         second = axes[-1]
         frames[place] = [normal, np.cross(second, normal), second]
         present[place, 3 - len(axes) :] = False
-        start, end = pairs.opposite.indptr[place : place + 2]
         turn = np.eye(3) if cut is None else cut.axis.pitch(int(pairs.sector[place]))
-        loose = [
-            np.abs(turn @ along(int(other)) @ turn.T - along(node)).max() > _SLANTED
-            for other in pairs.opposite.indices[start:end]
-        ]
-        if np.abs(pairs.opposite.data[start:end][loose]).sum() > _SLANTED:
+        face = pairs.opposite[[place]]
+        loose = [np.abs(turn @ along(int(other)) @ turn.T - along(node)).max() > _SLANTED for other in face.indices]
+        if np.abs(face.data[loose]).sum() > _SLANTED:
             found = f"node {numbers[node]} of {name} is held in a direction in which the other surface moves{by}"
             raise SceneError("contact", found, "hold both surfaces there, or none")
     return replace(pairs, frames=frames, present=present)

@@ -169,9 +169,8 @@ class Parameters(Scene):
         With a spring the closing displacement of the pair comes before that of the mass: a massless degree of freedom,
         pressed by `normal_load`.
         """
-        mass, damping, stiffness = (np.diag(each) for each in (
-            (0.0, self.mass), (0.0, self.damping), (self.normal_stiffness, self.stiffness)
-        ))  # fmt: skip
+        mass, damping = np.diag([0.0, self.mass]), np.diag([0.0, self.damping])
+        stiffness = np.diag([self.normal_stiffness, self.stiffness])
         sprung = self.normal_stiffness > 0
         own = slice(0 if sprung else 1, None)  # with the closing displacement, or without it
         return build_model(

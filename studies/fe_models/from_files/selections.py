@@ -139,11 +139,8 @@ def find_surfaces(selections: Selections, axis: CyclicAxis | None) -> tuple[Cont
     # a name that the deck does not have is said before a friction coefficient that is missing for it
     named = [_surfaces(selections, pair, "contact") for pair in chosen]
     friction = _friction(chosen, selections.parameters, deck)
-    sectors = _sectors(selections, named, chosen, axis)
-    contacts = [
-        replace(each, friction_coefficient=value, sector=sector)
-        for each, value, sector in zip(named, friction, sectors, strict=True)
-    ]
+    parts = zip(named, friction, _sectors(selections, named, chosen, axis), strict=True)
+    contacts = [replace(each, friction_coefficient=value, sector=sector) for each, value, sector in parts]
     ties = (_surfaces(selections, pair, "model") for pair in (*deck.ties, *glued))
     of_deck = given is None and bool(touching)
     return tuple(contacts), tuple(tie for tie in ties if not _released(tie, contacts, of_deck=of_deck))

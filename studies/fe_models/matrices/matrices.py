@@ -130,10 +130,8 @@ def assemble(parts: Mapping[str, Entries], files: tuple[str, ...], code: str) ->
     for name in ("stiffness", "mass"):
         if name not in square or not square[name].values.size:
             wrong(files[0], f"no {name} in the file", "write stiffness and mass")
-    # by hash: entries are many more than labels
-    labels = np.sort(
-        pd.unique(np.concatenate([part for each in square.values() for part in (each.rows, each.columns)]))
-    )
+    given = np.concatenate([part for each in square.values() for part in (each.rows, each.columns)])
+    labels = np.sort(pd.unique(given))  # by hash: entries are many more than labels
     if labels.size > _LARGEST_DOFS:
         wrong(files[0], f"{labels.size} dofs", f"reduce the model to at most {_LARGEST_DOFS}")
     found = {name: _symmetric(each, labels) for name, each in square.items()}

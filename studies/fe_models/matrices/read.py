@@ -305,9 +305,8 @@ def _find(path: Path) -> tuple[_Format, dict[str, Path]]:
                 may_miss = ("damping", "load", "rows")
                 return each, {part: own for part, own in files.items() if part not in may_miss or own.is_file()}
     firsts = [next(iter(each.ends.values())) for each in FORMATS if each.by_name]
-    found = [
-        file for end in firsts for file in sorted(path.parent.glob(escape(path.name) + end.replace("*", "[0-9]*")))
-    ]
+    patterns = [escape(path.name) + end.replace("*", "[0-9]*") for end in firsts]
+    found = [file for pattern in patterns for file in sorted(path.parent.glob(pattern))]
     if not found:
         looked_for = ", ".join(path.name + end.replace("*", "1") for end in firsts)
         raise SceneError("matrices", f"there is no {looked_for}", "give the name that the files have in common")
