@@ -19,10 +19,7 @@ from studies.scene_error import SceneError
 
 # which of the nodes of an element of ANSYS are those of which kind: bricks may be collapsed to wedges or tetrahedra
 _BRICK = {
-    8: (
-        ("C3D4", (0, 1, 2, 4), ((2, 3), (4, 5), (4, 6), (4, 7))),
-        ("C3D6", (0, 1, 2, 4, 5, 6), ((2, 3), (6, 7))),
-    ),
+    8: (("C3D4", (0, 1, 2, 4), ((2, 3), (4, 5), (4, 6), (4, 7))), ("C3D6", (0, 1, 2, 4, 5, 6), ((2, 3), (6, 7)))),
     20: (
         ("C3D10", (0, 1, 2, 4, 8, 9, 11, 16, 17, 18), ((2, 3), (4, 5), (4, 6), (4, 7))),
         ("C3D15", (0, 1, 2, 4, 5, 6, 8, 9, 11, 12, 13, 15, 16, 17, 18), ((2, 3), (6, 7))),
@@ -167,10 +164,8 @@ def _read_commands(path: Path) -> _Commands:
             node, label, value, *more = [*fields[1:], *[""] * 8]
             moved = to_float(value or "0")
             if not node.isdigit() or label not in _DIRECTIONS or any(more[1:]) or math.isnan(moved):
-                what = f"D of {shown(node)}, {shown(label)} = {shown(value)}"
-                raise place.wrong(
-                    what, "delete it, and give `clamp` in the study: nodes with UX, UY, UZ or ALL are read"
-                )
+                remedy = "delete it, and give `clamp` in the study: nodes with UX, UY, UZ or ALL are read"
+                raise place.wrong(f"D of {shown(node)}, {shown(label)} = {shown(value)}", remedy)
             found.held.setdefault((label, moved), []).append(int(node))
         elif command == "EBLO" and "SOLID" not in fields:
             raise place.wrong(f"{shown(','.join(fields))}: elements in this form are not read", _AGAIN)

@@ -219,11 +219,7 @@ def _blade_blocks(p: Parameters) -> list[FloatArray]:
     rows = x[-1 - spans[-1] :]
     edge = rows * tan(p.half_pitch) - 0.5 * p.platform_gap / cos(p.half_pitch)
     overhang = np.linspace(np.full(len(rows), neck), edge, m + 1, axis=1)
-    return [
-        np.concatenate([root, airfoil]),
-        _flat_grid(p, rows, overhang),
-        _flat_grid(p, rows, -overhang[:, ::-1]),
-    ]
+    return [np.concatenate([root, airfoil]), _flat_grid(p, rows, overhang), _flat_grid(p, rows, -overhang[:, ::-1])]
 
 
 def _flat_grid(p: Parameters, x: FloatArray, y: FloatArray) -> FloatArray:
@@ -251,10 +247,8 @@ def _airfoil_section(p: Parameters, height: float, across: FloatArray) -> FloatA
     stations = _axial_stations(p)
     edge = p.root_edge_thickness + share * (p.tip_edge_thickness - p.root_edge_thickness)
     profile = edge + (1.0 - edge) * (1.0 - (2.0 * stations) ** 2)
-    airfoil = (
-        chord * stations[None, :, None] * along
-        + 0.5 * thickness * profile[None, :, None] * across[:, None, None] * normal
-    )
+    half = 0.5 * thickness * profile[None, :, None]
+    airfoil = chord * stations[None, :, None] * along + half * across[:, None, None] * normal
     rectangle = np.zeros_like(airfoil)
     rectangle[..., 1] = p.flank_top_half_width * across[:, None]
     rectangle[..., 2] = p.rim_width * stations

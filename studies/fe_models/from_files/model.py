@@ -126,10 +126,8 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
     selections = replace(selections, references=supported.references)
     preload, gravity = _preload(selections, supported), None if deck.gravity is None else deck.gravity * units.length
     n_nodes, forms = len(supported.held), None
-    responses = {
-        name: _motion(selections, each, f"response.{name}.set", n_nodes)
-        for name, each in (parameters.response or {"load": parameters.load}).items()
-    }
+    asked = (parameters.response or {"load": parameters.load}).items()
+    responses = {name: _motion(selections, each, f"response.{name}.set", n_nodes) for name, each in asked}
     if imported is not None:
         if imported.matrices.load is not None:
             preload[imported.place] += imported.matrices.load[:, 0] * units.force

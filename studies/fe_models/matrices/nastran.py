@@ -201,11 +201,7 @@ def _text_columns(file: TextIO, kind: int, form: tuple[str, str]) -> Columns:
         head = file.readline()
         column, row, words = (int(head[at : at + 8]) for at in range(0, 24, 8))
         # of a column that is not sparse the numbers are counted, not their words
-        yield (
-            [column, row, words * (kind if row > 0 else 1)],
-            whole,
-            lambda words: read_fixed(file, words // kind, form),
-        )
+        yield [column, row, words * (kind if row > 0 else 1)], whole, lambda n: read_fixed(file, n // kind, form)
 
 
 def _binary(path: Path) -> Iterator[tuple[str, list[int], Columns]]:
