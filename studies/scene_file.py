@@ -31,11 +31,7 @@ from studies.scene_error import SceneError
 
 CONTACT = {
     "dofs": "whole",
-    "area": "real",
-    "gap": "real",
-    "normal_load": "real",
-    "friction_coefficient": "real",
-    "position": "real",
+    **dict.fromkeys(("area", "gap", "normal_load", "friction_coefficient", "position"), "real"),
     "edge": "flags",
     "surface": "text",
 }

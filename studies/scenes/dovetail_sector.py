@@ -14,7 +14,7 @@ turns about +z), then extrados; from the leading to the trailing edge; from the 
 from collections.abc import Iterator
 from dataclasses import replace
 from math import asin, atan2, cos, hypot, pi, radians, sin, sqrt, tan
-from typing import Annotated, ClassVar
+from typing import Annotated
 
 import numpy as np
 from pydantic import Field
@@ -34,18 +34,6 @@ class Parameters(SectorParameters):
 
     Radii of the dovetail and of the blade are measured along the centre line.
     """
-
-    ASCENDING: ClassVar = (
-        "bore_radius",
-        "hub_radius",
-        "web_inner_radius",
-        "web_outer_radius",
-        "rim_inner_radius",
-        "slot_bottom_radius",
-        "flank_top_radius",
-        "rim_radius",
-        "platform_radius",
-    )
 
     friction_coefficient: float = Field(0.5, ge=0, description="Coulomb friction coefficient of the flanks")
     rotation_speed: Rpm = Field(3000.0, gt=0, description="speed of rotation, which presses the flanks together")

@@ -25,11 +25,10 @@ AXIS, ORIGIN = np.array([0.0, 0.0, 1.0]), np.zeros(3)
 class SectorParameters(Scene):
     """Parameters that every sector has. SI units, except rotation speed and angles.
 
-    ASCENDING: radii, from the inside to the outside.
+    Keys that end in `_radius` ascend as their defaults do.
     """
 
     OFFERS: ClassVar = ("mesh",)
-    ASCENDING: ClassVar[tuple[str, ...]]
 
     rotation_speed: Rpm = Field(3000.0, ge=0, description="speed of rotation")
     nodal_diameter: int = Field(0, ge=0, description="nodal diameter of the travelling wave that excites the blades")
@@ -61,7 +60,9 @@ class SectorParameters(Scene):
 
     def impossible(self) -> Iterator[tuple[bool, str, str]]:
         """Whether parameters that are fine one by one do not go together, which one, and what would be right."""
-        for inner, outer in pairwise(self.ASCENDING):
+        fields = type(self).model_fields
+        radii = sorted((name for name in fields if name.endswith("_radius")), key=lambda name: fields[name].default)
+        for inner, outer in pairwise(radii):
             below = getattr(self, inner)
             yield below >= getattr(self, outer), outer, f"make it larger than {inner} = {below}"
 

@@ -12,7 +12,6 @@ second tangent. A mesh of density m has 4 m axial x (m + 1) pairs.
 
 from collections.abc import Iterator
 from math import cos, radians, sin
-from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -27,8 +26,6 @@ from studies.scenes.sector import SectorParameters, block_of, graded, mesh_of_bo
 
 class Parameters(SectorParameters):
     """One sector of a shrouded bladed disk. SI units, except rotation speed and angles."""
-
-    ASCENDING: ClassVar = ("bore_radius", "rim_radius")
 
     friction_coefficient: float = Field(0.3, ge=0, description="Coulomb friction coefficient of the shrouds")
     interference: Metre = Field(5e-4, ge=0, description="overlap of neighbouring shrouds before they are put together")

@@ -13,7 +13,6 @@ second tangent (up or down the roof). A mesh of density m has 4 m axial x (m + 1
 
 from collections.abc import Iterator
 from math import cos, radians, sin, tan
-from typing import ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -29,8 +28,6 @@ from studies.scenes.sector import AXIS, SectorParameters, block_of, graded, mesh
 
 class Parameters(SectorParameters):
     """One sector of a bladed disk with an underplatform damper. SI units, except rotation speed and angles."""
-
-    ASCENDING: ClassVar = ("bore_radius", "rim_radius", "platform_radius")
 
     friction_coefficient: float = Field(0.3, ge=0, description="Coulomb friction coefficient of the wedge")
     rotation_speed: Rpm = Field(3000.0, gt=0, description="speed of rotation, which presses the wedge")
