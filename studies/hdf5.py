@@ -109,8 +109,7 @@ def read_dataset(datasets: Datasets, key: str, kind: str) -> Any:
     if kind == "real" and np.iscomplexobj(values):
         raise SceneError(key, "complex", "give real numbers")
     if kind == "flags":
-        wrong = values[(values != 0) & (values != 1)]
-        if wrong.size:
+        if (wrong := values[(values != 0) & (values != 1)]).size:
             raise SceneError(key, str(wrong.flat[0]), "give 0 or 1")
         return np.asarray(values == 1)
     return as_whole(key, values) if kind == "whole" else values
@@ -120,8 +119,7 @@ def as_whole(key: str, values: Any) -> Any:
     """Whole numbers, which MATLAB writes as floating ones. Raises SceneError."""
     with np.errstate(invalid="ignore"):
         whole = values.real.astype(np.int64)
-    wrong = values[whole != values]
-    if wrong.size:
+    if (wrong := values[whole != values]).size:
         raise SceneError(key, str(wrong.flat[0]), "give whole numbers")
     return whole
 

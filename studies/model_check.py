@@ -63,8 +63,7 @@ def _check_contact(contact: ContactInterface, n: int) -> None:
         raise SceneError("contact/dofs", f"shape {dofs.shape}", remedy + turned)
     n_contact = len(dofs)
     for name in ("area", "gap", "normal_load", "position", "friction_coefficient", "edge"):
-        values = getattr(contact, name)
-        if values is not None:
+        if (values := getattr(contact, name)) is not None:
             _check_shape(f"contact/{name}", values, (n_contact, 3) if name == "position" else (n_contact,))
             infinite = np.isinf(values) if name == "position" else ~np.isfinite(values)
             _refuse(f"contact/{name}", values, infinite, "give finite numbers")
@@ -76,8 +75,7 @@ def _check_contact(contact: ContactInterface, n: int) -> None:
     if (counts > 1).any():
         found = f"index {used[counts > 1][0]} is used twice"
         raise SceneError("contact/dofs", found, "give every direction a displacement of its own")
-    without = np.flatnonzero((dofs < 0).all(axis=1))
-    if len(without):
+    if len(without := np.flatnonzero((dofs < 0).all(axis=1))):
         raise SceneError("contact/dofs", f"pair {without[0]} has no direction", "give it at least one, or leave it out")
     _refuse("contact/area", contact.area, contact.area <= 0, "give a positive area in m2")
     if contact.friction_coefficient is not None:
@@ -143,8 +141,7 @@ def _check_shape(key: str, values: NDArray[Any], shape: tuple[int, ...]) -> None
 
 def _refuse(key: str, values: NDArray[Any], wrong: NDArray[np.bool_], remedy: str) -> None:
     """Raises SceneError about the first of the values that are wrong."""
-    places = np.argwhere(wrong)
-    if len(places):
+    if len(places := np.argwhere(wrong)):
         at = ", ".join(str(int(index)) for index in places[0])
         raise SceneError(key, f"{values[tuple(places[0])]} at index {at}", remedy)
 

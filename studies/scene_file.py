@@ -143,8 +143,7 @@ def _open_scene(path: Path, group: str) -> Iterator[tuple[h5py.Group, Datasets, 
 
 
 def _check_indices(key: str, indices: NDArray[np.int64], n: int) -> None:
-    outside = indices[(indices < 0) | (indices >= n)]
-    if outside.size:
+    if (outside := indices[(indices < 0) | (indices >= n)]).size:
         raise SceneError(key, str(outside[0]), f"give indices from 0 to {n - 1}")
 
 

@@ -96,8 +96,7 @@ def _printable(text: str) -> str:
 def check_there(path: Path, key: str = "model") -> None:
     """Raises SceneError, about `key`, where there is no such file that can be read."""
     try:
-        there = path.is_file()
-        if there:
+        if there := path.is_file():
             path.open("rb").close()
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or "no name of a file"

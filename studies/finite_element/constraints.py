@@ -79,8 +79,7 @@ def eliminate(
     columns = np.concatenate([none, *(each.column for each in entries)])
     values = np.concatenate([np.empty(0), *(each.value for each in entries)])
     steps = sparse.csr_matrix((values, (rows, columns)), shape=(size, size))
-    total = resolve(steps)
-    if total is None:
+    if (total := resolve(steps)) is None:
         found = f"{places[0]}: displacements depend on each other in a circle"
         raise SceneError("model", found, "let each depend on others that do not depend on it")
     turns = []
@@ -110,13 +109,11 @@ def _check_once(dependent: IntArray, origins: Sequence[str], held: BoolArray, nu
         return f"{origins[place]}: displacement {at % 3 + 1} of node {numbers[at // 3]} depends on others"
 
     order = np.argsort(dependent, kind="stable")
-    twice = np.flatnonzero(dependent[order][1:] == dependent[order][:-1])
-    if len(twice):
+    if len(twice := np.flatnonzero(dependent[order][1:] == dependent[order][:-1])):
         first, second = order[twice[0]], order[twice[0] + 1]
         remedy = "let each displacement depend once: take it out of one of them"
         raise SceneError("model", f"{found(second)} by {origins[first]}", remedy)
-    wrong = np.flatnonzero(held.ravel()[dependent])
-    if len(wrong):
+    if len(wrong := np.flatnonzero(held.ravel()[dependent])):
         raise SceneError("model", f"{found(wrong[0])} and is held", "take the node out of one of them")
 
 

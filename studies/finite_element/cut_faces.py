@@ -140,8 +140,7 @@ def _mean_angle(cylinder: FloatArray) -> float:
 
 
 def _cut_faces(mesh: SolidMesh, axis: CyclicAxis, left: IntArray, right: IntArray) -> CutFaces:
-    both = np.intersect1d(left, right)
-    if len(both):
+    if len(both := np.intersect1d(left, right)):
         found = f"{len(both)} nodes are on both cut faces, as node {mesh.numbers[both[0]]}"
         raise SceneError("cut_faces", found, "a sector must not reach the axis, nor be the whole ring")
     return CutFaces(axis, left, right)

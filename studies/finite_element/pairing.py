@@ -148,8 +148,7 @@ def build_contact_pairs(
     """
     parts, coordinates = [], mesh.coordinates
     for place, contact in enumerate(contacts):
-        shared = np.intersect1d(contact.first.nodes, contact.second.nodes)
-        if len(shared):
+        if len(shared := np.intersect1d(contact.first.nodes, contact.second.nodes)):
             found = f"{contact.first.name} and {contact.second.name} share {len(shared)} nodes"
             raise SceneError("contact", found, "give the two bodies nodes of their own where they touch")
         both = contact.first, contact.second
@@ -182,8 +181,7 @@ def match_nodes(
     parts = []
     for place, contact in enumerate(contacts):
         nodes, others = contact.first.nodes, contact.second.nodes
-        unknown = nodes[~((area[nodes] > 0.0) & np.isfinite(normals[nodes]).all(axis=1))]
-        if len(unknown):
+        if len(unknown := nodes[~((area[nodes] > 0.0) & np.isfinite(normals[nodes]).all(axis=1))]):
             found = f"{len(unknown)} nodes of {contact.first.name} have no area or normal, as node"
             raise SceneError("contact", f"{found} {mesh.numbers[unknown[0]]}", "give both in the table of nodes")
         there = contact.beside(coordinates, axis)
@@ -243,8 +241,7 @@ def _joined(parts: Sequence[ContactPairs], mesh: SolidMesh) -> ContactPairs:
         **{name: np.concatenate([getattr(part, name) for part in parts]) for name in _ARRAYS},
     )
     unique, count = np.unique(joined.moving, return_counts=True)
-    twice = unique[count > 1]
-    if len(twice):
+    if len(twice := unique[count > 1]):
         names = " and ".join(joined.moving_name[place] for place in joined.surface[joined.moving == twice[0]])
         found = f"{len(twice)} nodes move in two pairs, in {names}, as node {mesh.numbers[twice[0]]}"
         raise SceneError("contact", found, "take them out of one of the surfaces")
@@ -321,8 +318,7 @@ def _check_match(match: _Match, mesh: SolidMesh, limit: float) -> None:
         raise SceneError("contact", found, remedy)
     remedy = "give surfaces that touch, of which one covers the other, or a larger tolerance, at most a facet"
     _check_near(contact, match.apart, limit, mesh, remedy)
-    aside = np.flatnonzero(match.facing > 0.0)
-    if len(aside):
+    if len(aside := np.flatnonzero(match.facing > 0.0)):
         found = f"{len(aside)} of {n} nodes of {moving} do not face {opposite}, as node"
         remedy = "leave them out of the surface"
         raise SceneError("contact", f"{found} {mesh.numbers[contact.first.nodes[aside[0]]]}", remedy)
@@ -330,8 +326,7 @@ def _check_match(match: _Match, mesh: SolidMesh, limit: float) -> None:
 
 def _check_near(contact: ContactSurfaces, apart: FloatArray, limit: float, mesh: SolidMesh, remedy: str) -> None:
     """Raises SceneError where nodes of the first surface are farther from the second than the limit; apart (n,), m."""
-    far = int(np.count_nonzero(apart > limit))
-    if far:
+    if far := int(np.count_nonzero(apart > limit)):
         worst, turned = int(np.argmax(apart)), " after a turn by one sector" if contact.sector else ""
         found = (
             f"{far} of {len(apart)} nodes of {contact.first.name} are farther than {limit:.3g} m from"

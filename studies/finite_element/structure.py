@@ -130,8 +130,7 @@ class Structure:
         if self.cut is not None:
             # a point of the next sector moves as its image in this one, turned and with the phase of the wave
             points = (self.cut.across(self.sectors, nodal_diameter) @ points).tocsr()
-        total = resolve(follow @ points + self.constraints.steps)
-        if total is None:
+        if (total := resolve(follow @ points + self.constraints.steps)) is None:
             raise SceneError("contact", "surfaces follow each other in a circle", "give every pair of surfaces once")
         return dofs, follow, points, total
 
@@ -212,8 +211,7 @@ def _check_followers(
     if cut is not None:
         ways.append((np.concatenate([cut.left, cut.right]), "is on a cut face", "let other nodes depend on this one"))
     for nodes, what, remedy in ways:
-        wrong = nodes[constraints.dependent[nodes].any(axis=1)]
-        if len(wrong):
+        if len(wrong := nodes[constraints.dependent[nodes].any(axis=1)]):
             found = f"{constraints.origin[int(wrong[0])]}: node {numbers[wrong[0]]} depends on others and {what}"
             raise SceneError("model", found, remedy)
     if cut is None:

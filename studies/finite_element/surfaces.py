@@ -171,8 +171,7 @@ def surface_of_nodes(mesh: SolidMesh, name: str, nodes: IntArray) -> Surface:
     inside = np.zeros(mesh.n_nodes, dtype=np.bool_)
     inside[nodes] = True
     surface = _surface(mesh, name, [face for face in outer_faces(mesh, inside) if inside[face.nodes].all()])
-    lonely = np.setdiff1d(nodes, surface.nodes)
-    if len(lonely):
+    if len(lonely := np.setdiff1d(nodes, surface.nodes)):
         found = f"{len(lonely)} of {len(nodes)} nodes of {name} belong to no face with all nodes in the set, as node"
         remedy = "give a surface of element faces, or a set of the nodes of whole faces"
         raise SceneError("contact", f"{found} {mesh.numbers[lonely[0]]}", remedy)

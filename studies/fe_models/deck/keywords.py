@@ -67,8 +67,7 @@ class Row:
 
     def reference(self, n: int) -> Reference:
         """What a field points to. Raises SceneError where it is missing."""
-        name = read_name(self.text(n))
-        if not name:
+        if not (name := read_name(self.text(n))):
             raise self.place.wrong("a name is missing", "give the name of a set or surface")
         return Reference(self.scope, name, self.place)
 
@@ -170,8 +169,7 @@ class Block:
 
     def name(self, parameter: str) -> str:
         """The value of a parameter that is a name, in capitals. Raises SceneError where it is missing."""
-        value = read_name(self.parameters.get(parameter, ""))
-        if not value:
+        if not (value := read_name(self.parameters.get(parameter, ""))):
             raise self.place.wrong(f"no {parameter}", f"write {parameter}=... behind the keyword")
         return value
 
@@ -264,8 +262,7 @@ def keyword(
 
 def find_keyword(block: Block, *, any_parameters: bool = False) -> Keyword:
     """What reads a keyword. Raises SceneError where it, or one of its parameters, may change the model."""
-    known = KEYWORDS.get(block.keyword)
-    if known is None:
+    if (known := KEYWORDS.get(block.keyword)) is None:
         remedy = _INSTEAD.get(block.keyword, "remove it if the model is right without it")
         raise block.place.wrong("this keyword is not read, and may change the model", remedy)
     for name in block.parameters:

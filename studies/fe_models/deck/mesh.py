@@ -111,8 +111,7 @@ class Mesh:
 
     def surface(self, reference: Reference) -> str:
         """Name of a surface."""
-        key = find_key(self.draft.surfaces, self.offsets, reference)
-        if key is None:
+        if (key := find_key(self.draft.surfaces, self.offsets, reference)) is None:
             raise reference.place.wrong(f"there is no surface {shown(reference.target)}", "define it with *SURFACE")
         return self._names(key, self.draft.surfaces)[0]
 
@@ -184,8 +183,7 @@ def _build_nodes(draft: Draft, offsets: Mapping[str, int]) -> tuple[IntArray, Fl
     order = np.argsort(numbers, kind="stable")
     numbers, coordinates = numbers[order], coordinates[order]
     again = np.flatnonzero(numbers[1:] == numbers[:-1])
-    moved = again[np.any(coordinates[again] != coordinates[again + 1], axis=1)]
-    if moved.size:
+    if (moved := again[np.any(coordinates[again] != coordinates[again + 1], axis=1)]).size:
         number = numbers[moved[0]]
         place = _place_of(draft.nodes, offsets, number)
         raise place.wrong(f"node {number} is defined again at another position", "give each node once")
@@ -216,8 +214,7 @@ def _build_blocks(draft: Draft, offsets: Mapping[str, int], nodes: IntArray) -> 
         order = np.argsort(numbers, kind="stable")
         blocks.append(ElementBlock(kind, numbers[order], used[order]))
     numbers = np.sort(np.concatenate([NONE, *(block.numbers for block in blocks)]))
-    again = numbers[1:][numbers[1:] == numbers[:-1]]
-    if again.size:
+    if (again := numbers[1:][numbers[1:] == numbers[:-1]]).size:
         place = _place_of(draft.elements, offsets, again[0])
         raise place.wrong(f"element {again[0]} is defined again", "give each element once")
     return tuple(block for block in blocks if block.numbers.size)

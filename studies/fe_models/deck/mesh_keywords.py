@@ -99,8 +99,7 @@ def _system(draft: Draft, block: Block) -> None:
 def _element(draft: Draft, block: Block) -> None:
     """Number and nodes, over as many lines as the element needs."""
     kind = block.name("TYPE")
-    length = NODES_OF_KIND.get(kind) or OTHER_KINDS.get(kind)
-    if length is None:
+    if (length := NODES_OF_KIND.get(kind) or OTHER_KINDS.get(kind)) is None:
         remedy = f"mesh with {', '.join(NODES_OF_KIND)}, and remove elements that carry nothing"
         raise block.place.wrong(f"elements of type {shown(kind)}", remedy)
     records = block.records(length + 1, f"a {kind} of {length} nodes with its number")

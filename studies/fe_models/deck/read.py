@@ -124,8 +124,7 @@ def _find_included(block: Block, folder: Path) -> Path:
 
 def _cut_keyword(text: str, place: Place) -> Block:
     written, _, rest = text[1:].partition(",")
-    keyword = "".join(written.split()).upper()
-    if not keyword:
+    if not (keyword := "".join(written.split()).upper()):
         raise place.wrong("a star without a keyword", "write **, where it begins a comment")
     place = Place(place.file, place.line, shown(" ".join(written.split()).upper()))
     parameters: dict[str, str] = {}

@@ -89,8 +89,7 @@ def _rigid(loaded: LoadedModel, scene: FeScene, highest: float) -> Iterator[tupl
     if resists == name:
         found = f"{name} strains the model where it moves as one body, by the energy of at most {resistance:.3g} Hz"
         yield "warning", f"{found}: join nodes that coincide, or let rotations follow"
-    held = _count_free_motions(scene.model)
-    if held:
+    if held := _count_free_motions(scene.model):
         verb = "motion is" if held == 1 else "motions are"
         yield "warning", f"{held} {verb} held by friction alone: give retention_stiffness"
 

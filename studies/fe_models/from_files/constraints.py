@@ -184,8 +184,7 @@ class _Builder:
 
     def _frame(self, node: int) -> FloatArray:
         """Unit vectors (3, 3), one a row, of the dofs 1 to 3 of a node. Raises SceneError of a node on the axis."""
-        transform = self.frames.get(node)
-        if transform is None:
+        if (transform := self.frames.get(node)) is None:
             return np.eye(3)
         start, end = transform.points
         if not transform.cylindrical:

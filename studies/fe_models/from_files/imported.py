@@ -102,8 +102,7 @@ def import_matrices(
     if deck.contact_nodes is not None:
         _check_table(matrices, selections, on_cut)
         return order_by_nodes(matrices, units, mesh)
-    other = np.flatnonzero((matrices.direction < 0) | (matrices.direction > 2))
-    if other.size:
+    if (other := np.flatnonzero((matrices.direction < 0) | (matrices.direction > 2))).size:
         found = f"{matrices.files[0]}: node {matrices.node[other[0]]} has the dof {matrices.direction[other[0]] + 1}"
         raise SceneError("matrices", found, "export dofs 1 to 3; to reduced matrices belongs a table of nodes, .csv")
     check_units(deck, mass_of(deck, matrices), units)
@@ -129,12 +128,10 @@ def _check_table(matrices: Matrices, selections: Selections, on_cut: IntArray) -
             raise SceneError(key, "the model is a table of nodes", remedy)
     if matrices.load is not None and matrices.load.shape[1] > 1:
         raise SceneError("matrices", f"{matrices.files[0]}: several load cases", "give one column of forces")
-    lost = np.setdiff1d(deck.node_numbers, matrices.node)
-    if len(lost):
+    if len(lost := np.setdiff1d(deck.node_numbers, matrices.node)):
         found = f"{len(lost)} nodes of {deck.path} have no row in {matrices.files[0]}, as node {lost[0]}"
         raise SceneError("matrices", found, "give the nodes that the matrices keep")
-    turning = matrices.node[np.isin(matrices.node, on_cut) & (matrices.direction > 2)]
-    if len(turning):
+    if len(turning := matrices.node[np.isin(matrices.node, on_cut) & (matrices.direction > 2)]):
         raise SceneError("cut_faces", f"node {turning[0]} has rotations", "reduce the sector to displacements there")
 
 
@@ -142,8 +139,7 @@ def check_nodes_have_dofs(matrices: Matrices, nodes: IntArray, name: str) -> Non
     """Every node (p,) of a surface or set, by its number, has all three dofs in the matrices. name: for the message."""
     wanted = np.unique(nodes)
     found, counts = np.unique(matrices.node, return_counts=True)
-    n_missing = int(np.count_nonzero(~np.isin(wanted, found[counts == 3])))
-    if n_missing:
+    if n_missing := int(np.count_nonzero(~np.isin(wanted, found[counts == 3]))):
         where = matrices.files[-1] if matrices.code == "calculix" else matrices.files[0]
         some = "lack dofs" if np.isin(wanted, found[counts < 3]).any() else "have no dof"
         what = f"{name}: {n_missing} of {wanted.size} nodes {some} in {where} (tied or fixed)"

@@ -74,8 +74,7 @@ class Selections:
         Raises SceneError where there is none.
         """
         known = capital(name)
-        surface = self._of_faces(known)
-        if surface is not None:
+        if (surface := self._of_faces(known)) is not None:
             return surface
         nodes = self.nodes(name, key)
         if self.deck.contact_nodes is not None:

@@ -116,8 +116,7 @@ def find_axes(deck: Deck, parameters: Parameters, units: Units) -> tuple[Rotatio
 
 def rotation_of_deck(deck: Deck, units: Units) -> Rotation | None:
     """The rotation, SI, of the centrifugal loads, None of none. Raises SceneError where parts turn differently."""
-    loads = deck.centrifugal
-    if not loads:
+    if not (loads := deck.centrifugal):
         return None
     for one, other in pairwise(loads):
         same = math.isclose(one.omega_squared, other.omega_squared, rel_tol=SPEED_AGREES)

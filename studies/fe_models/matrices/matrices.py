@@ -135,8 +135,7 @@ def assemble(parts: Mapping[str, Entries], files: tuple[str, ...], code: str) ->
     if labels.size > _LARGEST_DOFS:
         wrong(files[0], f"{labels.size} dofs", f"reduce the model to at most {_LARGEST_DOFS}")
     found = {name: _symmetric(each, labels) for name, each in square.items()}
-    held = int(np.count_nonzero(found["stiffness"].diagonal() > _HELD))
-    if held:
+    if held := int(np.count_nonzero(found["stiffness"].diagonal() > _HELD)):
         what = f"{held} entries of the diagonal are 1e36: boundary conditions were active at export"
         wrong(parts["stiffness"].file, what, "remove them in the step that writes the matrices")
     node, direction = labels // _DOFS, labels % _DOFS - 1

@@ -196,8 +196,7 @@ def _read_harwell_boeing(path: Path) -> sparse.coo_array:
             if any(int(count) for count in counts[4:]):
                 remedy = "write it without them, and the forces as job_load.hb"
                 wrong(path.name, "right-hand sides beside the matrix", remedy)
-            forms = _FORMAT.findall("".join(formats))
-            if len(forms) < 3:
+            if len(forms := _FORMAT.findall("".join(formats))) < 3:
                 raise ValueError(f"formats {' '.join(formats)}")
             lengths = (n_columns + 1, n_entries, n_entries)
             starts, rows, values = (read_fixed(file, *each) for each in zip(lengths, forms, strict=False))
@@ -306,8 +305,7 @@ def _find(path: Path) -> tuple[_Format, dict[str, Path]]:
                 return each, {part: own for part, own in files.items() if part not in may_miss or own.is_file()}
     firsts = [next(iter(each.ends.values())) for each in FORMATS if each.by_name]
     patterns = [escape(path.name) + end.replace("*", "[0-9]*") for end in firsts]
-    found = [file for pattern in patterns for file in sorted(path.parent.glob(pattern))]
-    if not found:
+    if not (found := [file for pattern in patterns for file in sorted(path.parent.glob(pattern))]):
         looked_for = ", ".join(path.name + end.replace("*", "1") for end in firsts)
         raise SceneError("matrices", f"there is no {looked_for}", "give the name that the files have in common")
     if len(found) > 1:
