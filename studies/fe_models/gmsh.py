@@ -120,11 +120,8 @@ def _numbers(section: bytes, binary: bool) -> _Take:
     return take
 
 
-# --- format 2.2: a number of rows as text, then the rows ---
-
-
 def _nodes_22(section: bytes, binary: bool) -> tuple[IntArray, FloatArray]:
-    """Numbers (n,) and coordinates (n, 3)."""
+    """Numbers (n,) and coordinates (n, 3). Format 2.2 has the number of rows as text, then the rows."""
     count, rest = section.split(b"\n", 1)
     if binary:
         rows = np.frombuffer(rest, [("number", "<i4"), ("at", "<f8", 3)], int(count))
@@ -156,11 +153,8 @@ def _elements_22(section: bytes, binary: bool) -> Iterator[_Block]:
         yield kind, nodes, [(int(tag), np.flatnonzero(physical == tag)) for tag in np.unique(physical)]
 
 
-# --- format 4.1: blocks of an entity each ---
-
-
 def _entities(take: _Take) -> dict[tuple[int, int], list[int]]:
-    """Tags of the physical groups of each entity, by its dimension and tag."""
+    """Tags of the physical groups of each entity, by dimension and tag. Format 4.1 has blocks of an entity each."""
     found = {}
     for dimension, n in enumerate(take("<u8", 4).tolist()):
         for _ in range(n):

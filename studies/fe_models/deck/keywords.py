@@ -19,9 +19,7 @@ _Thing = TypeVar("_Thing")
 def read_name(text: str) -> str:
     """A name in capitals: without blanks, or as it stands between quotation marks."""
     text = text.strip()
-    if len(text) >= 2 and text[0] == text[-1] == '"':
-        return text[1:-1].upper()
-    return "".join(text.split()).upper()
+    return text[1:-1].upper() if len(text) >= 2 and text[0] == text[-1] == '"' else "".join(text.split()).upper()
 
 
 @dataclass(frozen=True)

@@ -132,9 +132,8 @@ class _Builder:
             turn, deck = self._turn(motion), self.deck
             places = deck.coordinates[deck.rows_of_nodes(np.append(motion.nodes, motion.reference))]
             arms = (places[:-1] - places[-1]) * self.units.length
-            for k in range(3):
-                moved = np.cross(np.eye(3)[k], arms)[:, directions]  # theta_k e_k x arm
-                parts.append((rows, np.full(len(rows), 3 * turn + k), moved.ravel()))
+            moved = rigid_motions(arms)[:, directions, 3:].reshape(-1, 3)  # theta_k e_k x arm
+            parts += [(rows, np.full(len(rows), 3 * turn + k), moved[:, k]) for k in range(3)]
         row, column, value = (np.concatenate(each) for each in zip(*parts, strict=True))
         self.entries.append(Dependence(dependent, row, column, value, motion.place))
 
