@@ -116,18 +116,15 @@ def _deck(path: Path, archive: Any, commands: _Commands) -> Deck:
         rows.setdefault(name, []).append((int(element[8]), chosen))
         materials.add(int(element[0]))
     several = f"{path.name} has materials {' and '.join(map(str, sorted(materials)))}, of which the study gives one"
-    deck = deck_of_arrays(
-        path.name,
-        (np.asarray(archive.nnum, dtype=np.int64), np.asarray(archive.nodes, dtype=np.float64)[:, :3]),
-        [(name, np.array([n for n, _ in found]), np.stack([e for _, e in found])) for name, found in rows.items()],
-        archive.node_components.items(),
-        archive.element_components.items(),
-    )
+    nodes = np.asarray(archive.nnum, dtype=np.int64), np.asarray(archive.nodes, dtype=np.float64)[:, :3]
+    blocks = [(name, np.array([n for n, _ in found]), np.stack([e for _, e in found])) for name, found in rows.items()]
+    sets = archive.node_components.items(), archive.element_components.items()
+    deck = deck_of_arrays(path.name, nodes, blocks, *sets)
     return replace(
         deck,
         boundaries=tuple(
-            NodalValue(f"{path.name}: D", np.unique(nodes).astype(np.int64), *_DIRECTIONS[label], value)
-            for (label, value), nodes in commands.held.items()
+            NodalValue(f"{path.name}: D", np.unique(held).astype(np.int64), *_DIRECTIONS[label], value)
+            for (label, value), held in commands.held.items()
         ),
         notes=tuple(f"Elements of type {kind} are passed over." for kind in sorted(passed)),
         unassembled=(several,) if len(materials) > 1 else (),

@@ -143,10 +143,8 @@ class PreparedModel:
             digits = ", as far as the digits of the matrices tell" if self.rounding else ""
             found = f"{at} nothing holds the glued structure: its stiffness is singular{digits}"
             more = ", or write the matrices with more digits" if self.rounding else ""
-            remedy = (
-                f"clamp nodes, or hang a free body on soft elements{more}: with all pairs glued none may move freely"
-            )
-            raise SceneError("clamp", found, remedy) from error
+            remedy = f"clamp nodes, or hang a free body on soft elements{more}"
+            raise SceneError("clamp", found, f"{remedy}: with all pairs glued none may move freely") from error
 
 
 def _projected(coordinates: sparse.csr_matrix, form: sparse.csr_matrix) -> sparse.csr_matrix:

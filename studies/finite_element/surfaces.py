@@ -59,10 +59,8 @@ _GAUSS = np.polynomial.legendre.leggauss(3)
 _QUAD_RULE = np.stack(np.meshgrid(_GAUSS[0], _GAUSS[0]), axis=-1).reshape(-1, 2), np.outer(_GAUSS[1], _GAUSS[1]).ravel()
 # of the square, its side eta = 1 drawn together to a corner: exact to the fourth degree
 _XI, _ETA = _QUAD_RULE[0].T
-_TRIANGLE_RULE = (
-    np.stack([(1.0 + _XI) * (1.0 - _ETA) / 4.0, (1.0 + _ETA) / 2.0], axis=1),
-    _QUAD_RULE[1] * (1.0 - _ETA) / 8.0,
-)
+_TRIANGLE_POINTS = np.stack([(1.0 + _XI) * (1.0 - _ETA) / 4.0, (1.0 + _ETA) / 2.0], axis=1)
+_TRIANGLE_RULE = _TRIANGLE_POINTS, _QUAD_RULE[1] * (1.0 - _ETA) / 8.0
 
 
 def quad_values(points: FloatArray) -> FloatArray:

@@ -81,10 +81,8 @@ class Parameters(SectorParameters):
     def flank_bottom(self) -> tuple[float, float]:
         """Radius along the centre line and half width, m, at the inner end of the flanks."""
         angle = radians(self.flank_angle)
-        return (
-            self.flank_top_radius - self.flank_length * cos(angle),
-            self.flank_top_half_width + self.flank_length * sin(angle),
-        )
+        height, width = self.flank_length * cos(angle), self.flank_length * sin(angle)
+        return self.flank_top_radius - height, self.flank_top_half_width + width
 
     def impossible(self) -> Iterator[tuple[bool, str, str]]:  # noqa: D102
         yield from super().impossible()
@@ -178,10 +176,15 @@ def _disk_blocks(p: Parameters) -> list[FloatArray]:
     wall_x, wall_y = (graded([point[axis] for point in wall], [m, m, m]) for axis in (0, 1))
     post_angles = np.stack([np.linspace(atan2(y, x), p.half_pitch, m + 1) for x, y in zip(wall_x, wall_y, strict=True)])
     post_radii = np.array([hypot(x, y) for x, y in zip(wall_x, wall_y, strict=True)])
-    radii = graded(
-        [p.bore_radius, p.hub_radius, p.web_inner_radius, p.web_outer_radius, p.rim_inner_radius, p.slot_bottom_radius],
-        [max(1, m // 2), 2 * m, 2 * m, 2 * m, max(1, m // 2)],
-    )
+    web = [
+        p.bore_radius,
+        p.hub_radius,
+        p.web_inner_radius,
+        p.web_outer_radius,
+        p.rim_inner_radius,
+        p.slot_bottom_radius,
+    ]
+    radii = graded(web, [max(1, m // 2), 2 * m, 2 * m, 2 * m, max(1, m // 2)])
     # as across the root: elements even in number, so that there are nodes in the middle plane
     slot_angles = np.linspace(-slot_angle, slot_angle, 2 * (m // 2) + 3)
     angles = np.concatenate([-post_angles[0, :0:-1], slot_angles, post_angles[0, 1:]])

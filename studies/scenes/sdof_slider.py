@@ -66,11 +66,10 @@ class DenHartogSlider:
         With tau = omega_0 t from the turn x' = -r X sin(r tau) + (F_f / k) (sin(tau) + r G (cos(r tau) - cos(tau))),
         which has to stay negative until the next turn: X > S F_f / k, S the largest ratio of the two functions of tau.
         """
-        singular = self.ratio == 1.0 if friction_force == 0.0 else abs((1.0 / self.ratio) % 2.0 - 1.0) < _SINGULAR
-        if singular:
-            return False
         if friction_force == 0.0:
-            return True
+            return self.ratio != 1.0
+        if abs((1.0 / self.ratio) % 2.0 - 1.0) < _SINGULAR:
+            return False
         v, g = self._factors
         square = v**2 - (friction_force / self.force * g) ** 2
         return square > 0.0 and float(np.sqrt(square)) * self.force > self._needed * friction_force

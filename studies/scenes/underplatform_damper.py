@@ -66,10 +66,8 @@ class Parameters(SectorParameters):
             second = surfaces.surface_of_nodes(solid, f"underside, {label}", platform[0, other].ravel())
             return ContactSurfaces(first, second, label=label, sector=sector)
 
-        contacts = (
-            contact("this platform", slice(m + 1), slice(-m - 1, None), 0),
-            contact("next platform", slice(-m - 1, None), slice(m + 1), 1),
-        )
+        low, high = slice(m + 1), slice(-m - 1, None)
+        contacts = contact("this platform", low, high, 0), contact("next platform", high, low, 1)
         middle, across = blade[-1, :, 2 * m - 1 : 2 * m + 1].ravel(), np.array([0.0, cos(angle), -sin(angle)])
         cut, retainer = (disk[:, 0].ravel(), disk[:, -1].ravel()), Retainer(self.retention_stiffness, AXIS)
         return self.sector_of(solid, contacts, disk[0].ravel(), cut, (middle, across), retainer)

@@ -144,10 +144,8 @@ def _reduction_error(loaded: LoadedModel, scene: FeScene) -> str:
     elastic = other[:n] > 1e-3 * other[:n].max()
     own, other = (each[:n][elastic][: N_FREQUENCIES // 2] for each in (own, other))
     worst = np.abs(own / other - 1.0).max()
-    return (
-        f"{parameters.stuck_modes} modes; with the pairs sliding freely {_frequencies(own)} Hz, by at most"
-        f" {100.0 * worst:.2g} % off those with {more.stuck_modes}"
-    )
+    sliding = f"with the pairs sliding freely {_frequencies(own)} Hz, by at most {100.0 * worst:.2g} % off those with"
+    return f"{parameters.stuck_modes} modes; {sliding} {more.stuck_modes}"
 
 
 def _contacts(scene: FeScene) -> Iterator[str]:
@@ -158,10 +156,8 @@ def _contacts(scene: FeScene) -> Iterator[str]:
         distance = pairs.distance[own]
         distance = np.where(np.abs(distance) < _ROUND_OFF * np.sqrt(pairs.area[own].max()), 0.0, distance)
         nodes = "node" if own.sum() == 1 else "nodes"
-        yield (
-            f"{own.sum()} {nodes} of {moving} on {opposite}{neighbour}, {1e6 * pairs.area[own].sum():.5g} mm2,"
-            f" distances {distance.min():.2g} to {distance.max():.2g} m"
-        )
+        covered = f"{own.sum()} {nodes} of {moving} on {opposite}{neighbour}, {1e6 * pairs.area[own].sum():.5g} mm2"
+        yield f"{covered}, distances {distance.min():.2g} to {distance.max():.2g} m"
 
 
 def describe_rest(model: ReducedModel, friction_coefficient: float | None) -> str:
