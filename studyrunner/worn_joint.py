@@ -98,14 +98,15 @@ def _overrides(result: Result) -> dict[str, Any]:
 
     Raises UserError where each pair has drawn a value of its own, or the study is not that of the result.
     """
-    shown, study = result.shown, read_study(result.path)
-    sizes = {name: result.dataset.sizes[name] for name in result.axes}
-    if {name: len(values) for name, values in study.dimensions.items()} != sizes:
+    study = read_study(result.path)
+    sizes = {name: len(values) for name, values in study.dimensions.items()}
+    # a file of an earlier version lacks axes of later ones: the study has their defaults, one value each
+    if any(result.dataset.sizes.get(name, 1) != sizes.get(name, 1) for name in {*result.axes, *sizes}):
         raise UserError(str(result.path), "the attribute study", None, "give a result file of run-study that is whole")
     if study.scatter is not None and study.scatter.of_pairs:
         remedy = "give a result whose samples draw no value for each pair"
         raise UserError(str(result.path), f"scatter.{study.scatter.of_pairs[0]}", None, remedy)
-    points = points_of(study)
+    points, shown = points_of(study), dict.fromkeys(sizes, 0) | result.shown
     part = points.studies[points.at(points.columns["study"], shown)]
     keys: dict[str, Any] = {} if study.design is None else {"points": None}
     keys |= {f"axes.{axis.key[0]}": None for axis in study.scene_axes}

@@ -94,6 +94,16 @@ def test_the_worn_joint_of_a_sample_has_the_scene_of_the_sample(sliding, capsys)
     assert found["loops"].cycle.values.tolist() == [2000.0]
     own = results("w.nc").sel(P=1e4, sample=1)
     np.testing.assert_array_equal(results("worn_joint_loops.nc").contact_x, own.contact_x)
+    # an axis that came later has its default, and not another value
+    whole = xr.load_dataset("w.nc")
+    text = whole.attrs["study"].replace("excitation_amplitude = [1.0]\n", "")
+    assert text != whole.attrs["study"]
+    whole.squeeze("excitation_amplitude", drop=True).assign_attrs(study=text).to_netcdf("older.nc")
+    older = compute_worn_joint("older.nc", "older", loops=[0], point=point)
+    xr.testing.assert_equal(older["loops"], found["loops"])
+    whole.assign_attrs(study=text.replace("[axes]", "[axes]\nexcitation_amplitude = [1.0, 2.0]")).to_netcdf("other.nc")
+    with pytest.raises(UserError, match="attribute study"):
+        compute_worn_joint("other.nc", "other", loops=[0], point=point)
 
 
 # --- room for wear ---
