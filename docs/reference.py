@@ -16,20 +16,13 @@ from studies.fe_models.from_files.parameters import Parameters
 from studies.scene import list_keys
 from studies.scenes import BUNDLED, scene_help
 from studyrunner.coordinates import COORDINATES, SCENE, STUCK_FREQUENCY
+from studyrunner.kinds.missions.kind import OF_A_MISSION, OF_MISSIONS
+from studyrunner.kinds.modes.kind import OF_A_MODE_POINT, OF_MODES
+from studyrunner.kinds.wear.kind import ASKED, COUNTS, LOOPS, OF_A_HISTORY
 from studyrunner.report.contents import CAPTIONS, FIGURES
 from studyrunner.study.keys import key_list
 from studyrunner.summary.answer import ADVICE
-from studyrunner.variables import (
-    ASKED,
-    COUNTS,
-    LOOPS,
-    OF_A_HISTORY,
-    OF_A_MISSION,
-    OF_A_MODE_POINT,
-    OF_MISSIONS,
-    OF_MODES,
-    Variable,
-)
+from studyrunner.variables import Variable
 
 HEAD = """# Reference
 

@@ -8,14 +8,13 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from solver.contact.wear_law import WearTable
-from studyrunner.kinds import missions, modes, wear_plan
 from studyrunner.kinds.estimate import AUTOMATIC_HARMONICS, COMPILE_SECONDS, largest_memory, memory_a_rank
 from studyrunner.kinds.task import TaskPlan, Work, with_tasks
 from studyrunner.scene.answers import remarks_of_study
 from studyrunner.scene.scene import SceneFacts, farthest_from_default, values_of_point
 from studyrunner.scene.scene_set import SceneSet, merge_facts, plan_scenes
 from studyrunner.study.sections import AUTO, SOLVER_AXES
-from studyrunner.study.study import MISSIONS, MODES, Study
+from studyrunner.study.study import Study
 from studyrunner.system.progress import count, format_seconds
 from studyrunner.user_error import show_text
 
@@ -34,8 +33,7 @@ def build_tasks(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]) -> 
     """Tasks of a study. Their order and numbers depend on the study alone. facts: of each scene. Raises UserError where
     a sample draws a value that is none, or blocks of a mission differ in their pairs.
     """
-    builders = {MISSIONS.name: missions.build_tasks, MODES.name: modes.build_tasks}
-    build = builders.get(study.kind.name, wear_plan.build_tasks)
+    build: Callable[..., TaskPlan] = study.kind.part("tasks").build_tasks
     return build(study, with_tasks(study, scenes, facts), [each.n_displacements for each in facts])
 
 
@@ -53,8 +51,8 @@ class Effort(NamedTuple):
     longest: float
 
 
-def effort_of(works: Iterable[Work]) -> Effort:
-    """What all of these take."""
+def effort_of(study: Study, works: Iterable[Work]) -> Effort:
+    """What all of these take, of a study."""
     n_tasks, n_unknowns, seconds, longest = 0, 0, 0.0, 0.0
     n_of, n_results = Counter[str](), Counter[str]()
     for work in works:
@@ -62,15 +60,7 @@ def effort_of(works: Iterable[Work]) -> Effort:
         n_of[work.way] += work.n_tasks
         n_results[work.way] += work.n_results
         longest = max(longest, work.longest)
-    by = " and ".join(count(n_of[way], way) for way in ("sweep", "ramp") if n_of[way])
-    n_starts, modes = n_results["sweep"] + n_results["ramp"], count(n_of["mode"], "nonlinear mode")
-    parts = {
-        f"{count(n_starts, 'start state')} by {by}": n_starts,
-        count(n_results["history"], "wear history", "wear histories"): n_results["history"],
-        f"{modes} over the amplitude, {count(n_results['mode'], 'point')}": n_results["mode"],
-        f"{count(n_of['mission'], 'mission history', 'mission histories')}, each computed by one rank": n_of["mission"],
-    }
-    words = ", and ".join(text for text, number in parts.items() if number)
+    words = ", and ".join(study.kind.part("tasks").effort_words(n_of, n_results))
     return Effort(words, n_tasks, n_unknowns, seconds, longest)
 
 
@@ -81,7 +71,7 @@ def plan_lines(study: Study, say: Callable[[str], None]) -> list[str]:
     built_with = largest_memory() - before
     plan, largest = build_tasks(study, scenes, facts), merge_facts(facts)
     seconds = time.process_time() + seconds_left
-    effort = effort_of(itertools.chain((sweep.work for sweep in plan.sweeps), plan.works))
+    effort = effort_of(study, itertools.chain((sweep.work for sweep in plan.sweeps), plan.works))
     rows = [
         *_of_study(study, facts, plan, effort),
         *_of_effort(study, largest, plan, effort, built_with, seconds),
@@ -109,19 +99,7 @@ def _of_study(
         from studyrunner.statistics.sentences import what_samples_tell  # a run without samples needs no xarray
 
         yield "samples", what_samples_tell(study.scatter)
-    if study.follow is not None:
-        what = f"{study.follow.of}, found between {study.follow.low:g} and {study.follow.high:g} Hz by the sweep"
-        yield "frequency", what if study.output_counts[-1] == 0.0 else f"{what} and followed while the joint wears"
-    n_stored = len(study.output_counts)
-    if study.mission:
-        yield "missions", f"{study.slow_time.missions}, of which {count(n_stored, 'number is', 'numbers are')} stored"
-        for block, own in zip(study.mission, study.block_studies, strict=True):
-            yield "block", f"{block.name}: {block.describe(max(own.axes.frequency))}"
-    elif study.to_the_end:
-        until = f"until the wear rate of every pair is below {study.slow_time.final_share:g} of its largest"
-        yield "cycles", f"{until}; {n_stored} states are stored, spaced evenly in worn volume and cycles"
-    elif study.kind.counted:
-        yield "cycles", f"{study.output_counts[-1]:g}, of which {count(n_stored, 'count is', 'counts are')} stored"
+    yield from study.kind.part("tasks").plan_rows(study)
     yield "tasks", f"{effort.n_tasks}: {effort.words}"
 
 

@@ -80,7 +80,7 @@ def compute_study(
             display.say(f"from an earlier run: {run.n_points} of {count(plan.n_points, 'point')}")
         try:
             if run.tasks:
-                display.say(f"computing {effort_of(task.work for task in run.tasks).words}")
+                display.say(f"computing {effort_of(study, (task.work for task in run.tasks)).words}")
             serve_tasks(ranks, run, evaluator())
             display.say("writing the result")
             return write()

@@ -37,7 +37,7 @@ _HOW = (
 def has_worn_response(result: Result) -> bool:
     """Whether a result is one of wear histories, of which something is worn, over frequencies or at the resonance."""
     several = "frequency" in result.varying or "frequency_ratio" in result.varying or bool(result.followed)
-    needed = result.has("worn_volume", "response_amplitude") and result.blocks is None and not result.has_modes
+    needed = result.has("worn_volume", "response_amplitude") and result.kind.counted == "cycle"
     return needed and several and bool(np.nanmax(result.worn, initial=0.0) > NO_VOLUME)
 
 
@@ -64,7 +64,7 @@ def compute_worn_joint(
     """
     result, folder = open_for_report(path, point), Path(folder)
     with result.dataset:
-        if result.has_modes or result.blocks is not None:
+        if result.kind.counted != "cycle":
             raise UserError(str(path), "kind of study", None, "give a result of wear histories")
         shown, states = result.shown, dict[str, xr.Dataset]()
         last = result.last_reached(shown)

@@ -13,9 +13,11 @@ import tests.benchmarks
 from solver.outcome import Outcome
 from studies.fe_models.deck.read import HARMLESS, KEYWORDS
 from studies.scenes import BUNDLED
+from studyrunner.kinds.missions.kind import OF_A_MISSION, OF_MISSIONS
+from studyrunner.kinds.modes.kind import OF_MODES
+from studyrunner.kinds.wear.kind import ASKED, OF_A_HISTORY
 from studyrunner.report.contents import FIGURES
 from studyrunner.study.sections import SECTIONS
-from studyrunner.variables import ASKED, OF_A_HISTORY, OF_A_MISSION, OF_MISSIONS, OF_MODES
 
 ROOT = Path(__file__).parents[1]
 PACKAGES = [ROOT / name for name in ("solver", "studies", "studyrunner")]

@@ -1,6 +1,7 @@
 """What the samples of a study draw of its inputs, and the study of each sample."""
 
 from collections.abc import Iterator, Mapping
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -9,8 +10,7 @@ from solver.model import ContactInterface
 from studyrunner.scatter import Scattered, draw
 from studyrunner.study.room import with_room_for_wear
 from studyrunner.study.scene_section import SceneSection
-from studyrunner.study.sections import MissionBlock
-from studyrunner.study.study import NUMBERS, Study
+from studyrunner.study.study import Study
 from studyrunner.user_error import UserError
 from studyrunner.values import Wrong
 
@@ -35,7 +35,7 @@ def draw_inputs(
         raise UserError(study.source, error.key or "scatter", error.value, error.remedy) from None
 
 
-def block_of_input(study: Study, name: str) -> MissionBlock | None:
+def block_of_input(study: Study, name: str) -> Any | None:
     """The block of a mission for which the values of an input are shown: the first one where each has a value of its
     own; None where the values are around that of the study.
     """
@@ -46,7 +46,7 @@ def _own_value(study: Study, name: str, scattered: Scattered) -> ArrayLike:
     """The study's own value of an input; 1, for any, of an absolute distribution."""
     if block_of_input(study, name) is not None:
         return _own_value(study.block_studies[0], name, scattered)
-    if name in NUMBERS:
+    if name in study.kind.numbers:
         return np.array(getattr(study.axes, name))[:, None]
     value = {**dict(study.scene.parameters), **study.wear.numbers}.get(name)
     if isinstance(value, float | int):
@@ -65,10 +65,10 @@ def samples_of(study: Study) -> Iterator[Study]:
     assert study.scatter is not None
     values = draw_inputs(study)
     of_wear = [name for name in values if name in study.wear.numbers]
-    of_scene = [name for name in values if name not in (*NUMBERS, *of_wear)]
+    of_scene = [name for name in values if name not in (*study.kind.numbers, *of_wear)]
     blocks = [samples_of(block) for block in study.block_studies]
     for sample in range(study.scatter.n_rows):
-        of_axes = {name: tuple(values[name][:, sample].tolist()) for name in values if name in NUMBERS}
+        of_axes = {name: tuple(values[name][:, sample].tolist()) for name in values if name in study.kind.numbers}
         update: dict[str, object] = {"scatter": None, "axes": study.axes.model_copy(update=of_axes)}
         if of_scene:
             update["scene"] = _with_drawn(study, {name: float(values[name][sample]) for name in of_scene})

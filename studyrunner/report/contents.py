@@ -11,7 +11,7 @@ from studyrunner.report.selection import course_axis
 from studyrunner.result.pairs import OF_PAIRS, of_shown_scene
 from studyrunner.result.view import Result
 
-WEAR, MISSIONS, MODES = "wear histories", "missions", "modes"
+WEAR, MISSIONS, MODES = "wear histories", "missions", "nonlinear modes"
 """Kinds of results."""
 
 _BANDS, _BARS = "Bands: estimated errors", "Bars: estimated errors, none where they are smaller than the markers"
@@ -157,7 +157,7 @@ def draw_report(result: Result, width: float = plot.WIDTH) -> Iterator[Item]:
 
     width: of the figures, inches.
     """
-    kind = MODES if result.has_modes else WEAR if result.blocks is None else MISSIONS
+    kind = result.kind.words
     has_results = bool(result.has_values.any())
     for entry in FIGURES:
         if kind in entry.kinds and (has_results or entry.always):

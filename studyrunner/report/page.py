@@ -19,6 +19,7 @@ import xarray as xr
 from numpy.typing import ArrayLike, NDArray
 
 from studyrunner.coordinates import COORDINATES
+from studyrunner.kinds.wear.kind import CERTIFICATE, OWN_STEPS
 from studyrunner.report.drawing import Drawing, Item, Missing
 from studyrunner.report.figures.response import find_loops
 from studyrunner.report.root import body_colours, find_views, read_root
@@ -33,7 +34,6 @@ from studyrunner.system.process import raise_ending
 from studyrunner.system.progress import count
 from studyrunner.units import Scale, scale_for, show_number, units_of
 from studyrunner.user_error import show_text
-from studyrunner.variables import CERTIFICATE, OWN_STEPS
 
 DATA_LIMIT = 5e6
 """Most characters of numbers of the interactive part, those of the root in three dimensions aside."""
@@ -166,11 +166,11 @@ def build_page_data(result: Result, limit: float, notes: list[str]) -> dict[str,
     if result.has("cycle_count"):
         notes.append("Each point has cycle counts of its own, see cycle_count: cycle is the number of the output.")
     shown = dict(result.shown)
-    last = 0 if result.has_modes else result.last_reached(shown)
-    floats = math.inf if result.has_modes else limit / _CHARACTERS_A_FLOAT
+    last = result.last_reached(shown) if result.kind.counted else 0
+    floats = limit / _CHARACTERS_A_FLOAT if result.kind.counted else math.inf
     arrays, counts = _fit(_arrays(result), floats, notes)
     used = dict.fromkeys([*result.axes, *(str(dim) for array in arrays.values() for dim in array.dims)])
-    if not result.has_modes:
+    if result.kind.counted:
         shown["cycle"] = int(np.abs(counts - last).argmin())
     outcomes = np.unique(result.dataset["outcome"].values).tolist()
     messages = result.dataset["message"].values.ravel().tolist() if result.has("message") else []
@@ -244,7 +244,7 @@ def _encode(array: xr.DataArray, arrays: _Arrays) -> dict[str, Any]:
 def _dimension(result: Result, name: str, arrays: _Arrays) -> dict[str, Any]:
     """A dimension with its values: numbers, or words."""
     axis = next(array for array in arrays.values() if name in array.dims)[name]
-    label = result.counted if name == "cycle" and not result.has_modes else name.replace("_", " ")
+    label = result.counted if name == "cycle" and result.kind.counted else name.replace("_", " ")
     words, values = axis.dtype.kind not in "fiu", axis.values.tolist()
     numbers = [str(each) if words else each if math.isfinite(each) else None for each in values]
     return {

@@ -110,7 +110,7 @@ def course_axis(result: Result) -> str | None:
     """
     varying = [name for name in result.varying if name not in (POINT, SAMPLE)]
     numbers = [name for name in varying if result.dataset[name].dtype.kind in "iuf"]
-    of_first_rank = [name for name in ("frequency", "modal_amplitude") if name in numbers]
+    of_first_rank = [name for name in ("frequency", *result.kind.last_axes) if name in numbers]
     return next(iter(of_first_rank + numbers), None)
 
 
@@ -140,7 +140,7 @@ def cell_edges(positions: FloatArray) -> FloatArray:
 
 def slow_time(result: Result, scale: Scale) -> str:
     """Label of an axis of slow time."""
-    return scale.label("vibration cycles") if result.blocks is None else "missions"
+    return scale.label("vibration cycles") if result.kind.counted == "cycle" else result.counted
 
 
 def labelled(text: str, label: str) -> str:

@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from solver.outcome import Outcome
 from studyrunner.coordinates import COORDINATES, POINT, SAMPLE, STUCK_FREQUENCY, WORN_DEPTH
+from studyrunner.kinds.wear.kind import ASKED, LOOP_COMPONENTS, LOOP_PHASES
 from studyrunner.points.draw import block_of_input
 from studyrunner.points.table import Column, Points
 from studyrunner.scene import scene_set
@@ -14,8 +15,8 @@ from studyrunner.scene.answers import SmallArray
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.study.scene_axes import describe_key
 from studyrunner.study.sections import SOLVER_AXES
-from studyrunner.study.study import NUMBERS, Study
-from studyrunner.variables import ASKED, LOOP_COMPONENTS, LOOP_PHASES, Variable
+from studyrunner.study.study import Study
+from studyrunner.variables import Variable
 
 _NAMED = COORDINATES | {
     "gap": Variable(("contact",), "m", "initial gap of the contact pair"),
@@ -63,9 +64,9 @@ def coordinates(study: Study, of_scenes: Sequence[SceneFacts], scenes: scene_set
     """Coordinates of the file but those of samples and worn joints. of_scenes: facts of each."""
     facts = scene_set.merge_facts(of_scenes)
     along: dict[str, Sequence[object] | NDArray[np.generic]] = dict(study.dimensions)
-    counted = np.array(study.output_counts, dtype=int if study.mission else float)
+    counted = np.array(study.output_counts, dtype=int if study.kind.whole else float)
     along.setdefault(study.kind.counted or "cycle", counted)
-    along |= {"block": [block.name for block in study.mission]} if study.mission else {}
+    along |= study.kind.dimensions(study)
     along |= {"contact": range(facts.contact.n_contact), "response": facts.response_names}
     if study.outputs.loops:
         along |= {"phase": 2.0 * np.pi * np.arange(LOOP_PHASES) / LOOP_PHASES, "component": LOOP_COMPONENTS}
@@ -108,13 +109,10 @@ def _coordinate_entry(study: Study, name: str) -> Variable:
     if name == "cycle" and study.to_the_end:
         comment = "Spaced evenly in worn volume and cycles, to the last; cycle_count has the counts of each point."
         return Variable((), "1", "number of the output", comment=comment)
-    if name == "sweep" and not study.kind.counted:
-        comment = "up: the modal amplitude is raised from zero; down: raised to a larger one, then lowered."
-        return Variable((), "1", "how the amplitude is reached", comment=comment)
     for axis in study.scene_axes:
         if axis.name == name:
             return Variable((), axis.units, axis.meaning, comment=f"Key {axis.table}.{axis.dotted} of the study.")
-    return COORDINATES[name]
+    return {**COORDINATES, **study.kind.coordinates}[name]
 
 
 def _worn_coordinate(study: Study, facts: Sequence[SceneFacts], points: Points) -> Iterator[SmallArray]:
@@ -149,7 +147,7 @@ def _drawn(study: Study, points: Points, name: str) -> Column:
     """What the samples draw of an input that is the same for all pairs."""
     in_block = block_of_input(study, name) is not None
     parts = [each.block_studies[0] if in_block else each for each in points.studies]
-    if name in NUMBERS:
+    if name in study.kind.numbers:
         axes = [getattr(each.axes, name) for each in parts]
         places = points.columns[name]
         return points.combined(lambda number, at: axes[number][0 if in_block else at], points.columns["study"], places)

@@ -18,11 +18,17 @@ import xarray as xr
 
 from solver.outcome import Outcome
 from studyrunner.coordinates import COORDINATES, POINT, SAMPLE, SCENE, STUCK_FREQUENCY, WORN_DEPTH
+from studyrunner.kinds.kind import Kind
+from studyrunner.kinds.table import kind_of_file
+from studyrunner.kinds.wear.kind import CERTIFICATE, LOOPS
 from studyrunner.statistics.samples import DRAWN
 from studyrunner.study.text import check_result_file, read_toml
 from studyrunner.user_error import UserError, Verbatim, show_text
 from studyrunner.values import Wrong
-from studyrunner.variables import CERTIFICATE, IN_FILES, LOOPS, Variable
+from studyrunner.variables import Variable
+
+KIND = "kind"
+"""Attribute of a result: name of its kind of study."""
 
 ENDED = "ended"
 """Coordinate of an opened result: `outcome` in words."""
@@ -117,9 +123,10 @@ def as_history(dataset: xr.Dataset) -> tuple[xr.Dataset, xr.Dataset | None]:
         has_unit = np.char.endswith(dataset["response"].values.astype(str), "]")
         if has_unit.any() and not has_unit.all():
             history = history.isel(response=np.flatnonzero(~has_unit))
+    counted = kind_of(dataset).counted
     if "block" in dataset.dims:
         names = map(str, history.variables)
-        renamed = history.rename({name: name.replace("mission", "cycle") for name in names if "mission" in name})
+        renamed = history.rename({name: name.replace(counted, "cycle") for name in names if counted in name})
         of_blocks = [name for name, variable in renamed.variables.items() if "block" in variable.dims]
         history, blocks = renamed.drop_vars(of_blocks), renamed[of_blocks]
     if history is not dataset:
@@ -156,6 +163,12 @@ def outcome_words(outcome: xr.DataArray) -> xr.DataArray:
     values = np.array(words, dtype=np.str_).reshape(outcome.shape)
     attributes = {"units": "1", "long_name": "how the computation of the point ended, in a word"}
     return xr.DataArray(values, outcome.coords, outcome.dims, attrs=attributes)
+
+
+def kind_of(dataset: xr.Dataset) -> Kind:
+    """The kind of study of an opened result. Raises Wrong where it is one of a later version."""
+    given = dataset.attrs.get(KIND)
+    return kind_of_file(None if given is None else _decoded(given), [str(name) for name in dataset.dims])
 
 
 def study_tables(attributes: Mapping[str, object]) -> dict[str, dict[str, object]]:
@@ -200,13 +213,10 @@ def _need(right: object, name: str, wrong: str) -> None:
         raise Wrong(name, Verbatim(wrong), _REMEDY)
 
 
-def _slow_time(dataset: xr.Dataset) -> str:
-    return "mission" if "mission" in dataset.dims else "cycle"
-
-
 def _known_variables(dataset: xr.Dataset) -> dict[str, tuple[tuple[str, ...], Variable | None]]:
     """Of each variable that the report knows its dimensions and what it is, None for the values of an axis."""
-    slow, sizes = _slow_time(dataset), {str(name): size for name, size in dataset.sizes.items()}
+    kind, sizes = kind_of(dataset), {str(name): size for name, size in dataset.sizes.items()}
+    slow = kind.counted or "cycle"
     if lacking := [name for name in ("outcome", slow, "contact") if name not in dataset.variables]:
         raise Wrong("OUT.nc", None, f"holds no {' and no '.join(lacking)}; {_REMEDY}")
     axes = tuple(map(str, dataset["outcome"].dims))
@@ -217,7 +227,7 @@ def _known_variables(dataset: xr.Dataset) -> dict[str, tuple[tuple[str, ...], Va
     n_values = n_points * math.prod(sizes.get(name, 1) for name in (slow, "response", "block"))
     is_small = n_points <= _MOST_POINTS and n_values <= _MOST_VALUES
     _need(is_small, "outcome", f"{n_points} points, {sizes[slow]} counts of {slow}s")
-    with_axes = IN_FILES["modal_amplitude" if "modal_amplitude" in axes else slow] | SCENE["exact"]
+    with_axes = {**kind.variables, **SCENE["exact"]}
     known: dict[str, tuple[tuple[str, ...], Variable | None]] = {}
     for name, variable in ((str(name), variable) for name, variable in dataset.variables.items()):
         # what is of the scene, or drawn, has those axes along which it differs
@@ -262,7 +272,7 @@ def _check_variable(name: str, variable: xr.Variable, dimensions: tuple[str, ...
 
 def _check_values(dataset: xr.Dataset) -> None:
     """Tests the values that lead to other values: cycles or missions, pairs and mesh."""
-    slow = _slow_time(dataset)
+    slow = kind_of(dataset).counted or "cycle"
     # worn joints whose modes are sought stand in any order
     counts = np.sort(dataset[slow].values) if slow in dataset["outcome"].dims else dataset[slow].values
     rising = counts.dtype.kind in "iuf" and counts[0] >= 0 and (np.diff(counts) > 0).all()

@@ -45,6 +45,7 @@ def describe_run(study: Study, facts: SceneFacts) -> dict[str, str]:
         "comment": _COMMENT,
         "processing_level": "model result, not processed further",
         "product_version": metadata.version(PACKAGES[0]),
+        "kind": study.kind.name,
         "study": text,
         "versions": describe_versions(),
         "solver_digest": solver,

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 
 from solver.outcome import COMPLETE, SENSITIVE_ERROR, Outcome
 from studyrunner.coordinates import POINT
-from studyrunner.result.opening import ENDED, as_history, open_known, study_tables
+from studyrunner.kinds.kind import Kind
+from studyrunner.result.opening import ENDED, as_history, kind_of, open_known, study_tables
 from studyrunner.result.profile import Profile
 from studyrunner.statistics.study_statistics import statistics_of_file
 from studyrunner.units import show_cycles, show_value
@@ -79,20 +80,20 @@ class Result:
         """Axes that are numerical settings."""
         return [name for name in self.axes if name in ("step", "scheme") or name in self.study.get("solver", {})]
 
-    @property
-    def has_modes(self) -> bool:
-        """Whether the points are those of nonlinear modes, which have no slow time: `cycle` is then an axis."""
-        return "modal_amplitude" in self.axes
+    @cached_property
+    def kind(self) -> Kind:
+        """Which kind of study this is the result of."""
+        return kind_of(self.dataset)
 
     @property
     def counted(self) -> str:
         """What slow time counts: "cycles" or "missions"."""
-        return "cycles" if self.blocks is None else "missions"
+        return f"{self.kind.counted}s"
 
     @property
     def wears(self) -> bool:
         """Whether wear was asked for, and not unworn states or modes only."""
-        return not self.has_modes and (self.has("cycle_count") or bool(self.dataset["cycle"].values[-1] > 0.0))
+        return bool(self.kind.counted) and (self.has("cycle_count") or bool(self.dataset["cycle"].values[-1] > 0.0))
 
     @property
     def followed(self) -> str:
@@ -123,7 +124,7 @@ class Result:
     def at(self, name: str, point: Point, cycle: int | slice | list[int] = slice(None)) -> xr.DataArray:
         """A variable of one point, read for this point only. cycle: index, or indices, along `cycle` if it has that."""
         values = self.dataset[name].isel(point, missing_dims="ignore")
-        return values.isel(cycle=cycle) if "cycle" in values.dims and not self.has_modes else values
+        return values.isel(cycle=cycle) if "cycle" in values.dims and self.kind.counted else values
 
     def over_points(
         self, name: str, reduce: Callable[[NDArray[np.float64]], NDArray[np.float64]]
@@ -145,7 +146,8 @@ class Result:
     def computed(self) -> Mask:
         """Points that were computed to the end."""
         # version 0.4 has kept nothing of other points than these
-        return self.ended(*COMPLETE) if self.has("last_cycle") or self.has_modes else self.ended(Outcome.CONVERGED)
+        is_old = bool(self.kind.counted) and not self.has("last_cycle")
+        return self.ended(Outcome.CONVERGED) if is_old else self.ended(*COMPLETE)
 
     def of_points(self, name: str, cycle: int | None = None) -> NDArray[Any]:
         """A variable of all points (axes..., what follows), also along axes that it lacks. cycle: index of a count."""
@@ -155,7 +157,7 @@ class Result:
     @cached_property
     def last_cycle(self) -> NDArray[np.float64]:
         """Last cycle counts with values, NaN without values."""
-        if self.has_modes:
+        if not self.kind.counted:
             return np.where(self.computed, 0.0, np.nan)
         last = self.dataset["last_cycle"].values if self.has("last_cycle") else np.nan
         # points of an older file, or of one that was joined to this
@@ -164,7 +166,7 @@ class Result:
     @cached_property
     def has_values(self) -> Mask:
         """Points with values, if only of the first cycles."""
-        if self.has_modes:
+        if not self.kind.counted:
             return self.computed
         return np.asarray(self.computed | (self.last_cycle >= self.dataset["cycle"].values[0]))
 
@@ -250,10 +252,10 @@ class Result:
         Where nothing is worn the one with the largest response at first. Other points count only where there is none.
         """
         everywhere = has_slow_time = np.ones(self.computed.shape, np.bool_)
-        measures = [self.of_points("modal_amplitude")] if self.has_modes else []
-        if not self.has_modes and self.has("worn_volume"):
+        measures = [self.of_points(name) for name in self.kind.last_axes]
+        if self.kind.counted and self.has("worn_volume"):
             measures.append(self.worn)
-        if not self.has_modes and self.has("response_amplitude"):
+        if self.kind.counted and self.has("response_amplitude"):
             measures.append(self.of_points("response_amplitude", 0).max(axis=-1))
         if self.has("cycle_count"):
             has_slow_time = np.isfinite(self.of_points("cycle_count", -1))

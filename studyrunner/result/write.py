@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 from solver.outcome import Outcome
 from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.checkpoint.store import RESULTS
+from studyrunner.kinds.wear.kind import LOOPS
 from studyrunner.result.arrays import attributes
 from studyrunner.result.target import Target
 from studyrunner.scene.answers import SmallArray, StoredScene
@@ -29,7 +30,7 @@ from studyrunner.study.study import Study
 from studyrunner.study.text import POINTS_LEFT, SCENE_GROUP
 from studyrunner.system.machine import find_fault, replacing
 from studyrunner.user_error import StorageError
-from studyrunner.variables import LOOPS, Variable
+from studyrunner.variables import Variable
 
 _BYTES_A_SLAB = 16e6
 _BYTES_OF_CACHE = 2**16

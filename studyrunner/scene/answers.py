@@ -169,7 +169,7 @@ def _changed(study: Study) -> frozenset[str]:
 
     What depends on such a key has a closed form that knows the key, or none.
     """
-    changed = {name for name in ("scatter", "loading", "mission") if getattr(study, name)}
+    changed = {name for name in ("scatter", "loading", "tables") if getattr(study, name)}
     for name, without in _NOT_ASKED:
         table = getattr(study, name)
         for key, entry in type(table).model_fields.items():

@@ -17,11 +17,11 @@ from studies.fe_models.files import file_digest
 from studies.scene import Progress, SurfaceMesh, as_scene, make_compliant, silent, stuck_frequencies
 from studies.scene_error import SceneError
 from studies.scenes import AUTOMATIC_HARMONICS_OF_A_WAVE, build_scene
+from studyrunner.kinds.wear.kind import LOOP_COMPONENTS, LOOP_PHASES, LOOPS
 from studyrunner.study.mistakes import raise_wrong, scene_errors
 from studyrunner.study.study import Study
 from studyrunner.system.machine import package_digest
 from studyrunner.values import Wrong
-from studyrunner.variables import LOOP_COMPONENTS, LOOP_PHASES, LOOPS
 
 _LARGEST_HISTORY = 1e9  # bytes: a result is one message between ranks
 
@@ -157,9 +157,9 @@ def _wrong_beside(study: Study, model: ReducedModel) -> Iterator[Wrong]:
 def variable_sizes(study: Study, facts: SceneFacts) -> dict[str, int]:
     """Lengths of the dimensions after the axes."""
     counted = {study.kind.counted: len(study.output_counts)} if study.kind.counted else {}
-    blocks = {"block": len(study.mission)} if study.mission else {}
+    own = {name: len(values) for name, values in study.kind.dimensions(study).items()}
     loops = {"phase": LOOP_PHASES, "component": len(LOOP_COMPONENTS)} if study.outputs.loops else {}
-    return {**counted, **blocks, "contact": facts.contact.n_contact, "response": len(facts.response_names), **loops}
+    return {**counted, **own, "contact": facts.contact.n_contact, "response": len(facts.response_names), **loops}
 
 
 def record_fields(study: Study, facts: SceneFacts) -> list[tuple[str, str, tuple[int, ...]]]:

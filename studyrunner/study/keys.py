@@ -7,9 +7,10 @@ from typing import Literal, get_args, get_origin
 import numpy as np
 
 from studies.scene import describe_field
+from studyrunner.kinds.table import KINDS
 from studyrunner.study.mistakes import check_tables, keys_as_given, scene_errors
 from studyrunner.study.scene_section import SceneSection
-from studyrunner.study.sections import SECTIONS, MissionBlock, StudySection
+from studyrunner.study.sections import SECTIONS, StudySection
 from studyrunner.user_error import UserError, toml_value
 from studyrunner.values import Section
 
@@ -64,8 +65,9 @@ def write_new_study(name: str, deck: Path | None = None) -> Path:
         given = tables.get(table, {})
         lines.append(f"[{table}]")
         lines += [f"{key} = {toml_value(value)}" + f" # {note}" * bool(note) for key, (value, note) in given.items()]
-        others = [each for each in _keys(table, SECTIONS[table]) if each[0] not in given] if table != "scene" else []
-        lines += [f"# {key} = {default} # {meaning}" for key, default, meaning in others if default]
+        others = _keys(table, SECTIONS[table]) if table != "scene" else ()
+        own = (each for each in others if each[0] not in given and KINDS["wear"].is_read(table, each[0]))
+        lines += [f"# {key} = {default} # {meaning}" for key, default, meaning in own if default]
         lines.append("")
     try:
         with path.open("x", encoding="utf-8") as file:
@@ -118,11 +120,13 @@ def _tables_of_deck(path: Path) -> dict[str, Given]:
 def key_list() -> str:
     """Markdown: all keys of a study file with default and meaning."""
     lines = []
-    kinds: dict[str, type[Section]] = {**SECTIONS, "scene": SceneSection, "mission": MissionBlock}
-    for table in ("study", "scene", "axes", "wear", "slow_time", "solver", "outputs", "loading", "scatter", "mission"):
-        for key, default, meaning in _keys(table, kinds[table]):
+    of_kinds = {kind.table: kind.part("rules").TABLE for kind in KINDS.values() if kind.table}
+    tables: dict[str, type[Section]] = {**SECTIONS, "scene": SceneSection, **of_kinds}
+    order = ("study", "scene", "axes", "wear", "slow_time", "solver", "outputs", "loading", "scatter", *of_kinds)
+    for table in order:
+        for key, default, meaning in _keys(table, tables[table]):
             shown = f"`{table}.{key} = {default}`" if default else f"`{table}.{key}`"
-            needed = " (required)" if kinds[table].model_fields[key].is_required() else ""
+            needed = " (required)" if tables[table].model_fields[key].is_required() else ""
             lines.append(f"- {shown}{needed}: {meaning}")
     return "\n".join(lines)
 

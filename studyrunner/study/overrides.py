@@ -6,6 +6,7 @@ import re
 from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
+from studyrunner.kinds.table import KINDS
 from studyrunner.study import scene_axes, sections
 from studyrunner.study.design import Design
 from studyrunner.study.text import read_toml
@@ -14,7 +15,7 @@ from studyrunner.user_error import UserError
 _INSTEAD = {"axes.frequency": "frequency_ratio", "axes.frequency_ratio": "frequency"}
 """Keys that stand in each other's place."""
 
-_NO_COLUMNS = ("model", "worn", "mode", "modal_amplitude")
+_NO_COLUMNS = ("model", "worn", *(name for kind in KINDS.values() for name in kind.no_columns))
 """Names that no column of a design has: each point has whole modes, over their amplitude."""
 
 

@@ -4,13 +4,12 @@ from collections.abc import Iterator
 from typing import Any, get_args
 
 from solver.settings import FIRST_HARMONICS
-from studyrunner.coordinates import SCENE
+from studyrunner.kinds.table import KINDS
 from studyrunner.scatter import OF_PAIRS
 from studyrunner.study.mistakes import nearest_name
-from studyrunner.study.sections import AUTO, DEFAULT, OWN_AXES
-from studyrunner.study.study import MISSIONS, MODES, NUMBERS, WEAR, Study
+from studyrunner.study.sections import AUTO, DEFAULT
+from studyrunner.study.study import Study
 from studyrunner.values import Wrong
-from studyrunner.variables import OF_A_HISTORY
 
 _MOST_POINTS = 1_000_000
 
@@ -19,56 +18,33 @@ def broken_rules(study: Study, first: bool) -> Iterator[Wrong]:
     """All that does not fit together. study: with its axes, without variants, and before it is complete. first: whether
     it is the first of the variants, which have the same axes.
     """
-    for rule in (_kind, *((_blocks, _frequency) if first else ()), _outputs, _solver_and_end, _scatter):
+    of_all = (_keys, study.kind.part("rules").broken_rules, _frequency) if first else ()
+    for rule in (*of_all, _outputs, _solver_and_end, _scatter):
         yield from rule(study)
 
 
-def _kind(study: Study) -> Iterator[Wrong]:
-    """Keys have a use in a study of this kind; missions are counted where there are blocks."""
-    kind, axes, worn, missions = study.kind, study.axes, study.scene.worn, study.slow_time.missions
-    for name, keys in kind.unused.items():
-        table = getattr(study, name)
-        given = {key: getattr(table, key) for key in keys if key in table.model_fields_set}
-        yield from (Wrong(f"{name}.{key}", value, kind.why) for key, value in given.items() if value != ())
-    if kind is MODES and "ramp" in axes.sweep:
-        yield Wrong("axes.sweep", "ramp", 'give "up" or "down": the modal amplitude is raised or lowered')
-    if kind is MODES and worn is not None and not any(axis.key == ("worn",) for axis in study.scene_axes):
-        remedy = "missing: give the cycle count of each depth, the coordinate of the modes"
-        yield Wrong("scene.worn.cycle", None, remedy)
-    if kind is not MODES and axes.mode != (1,):
-        yield Wrong("axes.mode", axes.mode, "give axes.modal_amplitude as well: mode is that of a nonlinear mode")
-    if kind is not MODES and (kind is MISSIONS) != (missions is not None):
-        yield Wrong("slow_time.missions", missions, "give it with blocks under [[mission]], else slow_time.cycles")
-
-
-def _blocks(study: Study) -> Iterator[Wrong]:
-    """Each block has a frequency and can begin as it says; an axis has a use in one block at least."""
-    blocks, axes = study.mission, study.axes
-    for before, block in zip((*blocks[-1:], *blocks), blocks, strict=False):
-        key, (theirs, ours) = f"mission.{block.name}", (before.parameters, block.parameters)
-        changed = any(theirs.get(name) != ours.get(name) for name in {**theirs, **ours})
-        if not block.gives("frequency") and not axes.frequency:
-            yield Wrong(f"{key}.frequency", None, "missing: give it here, or axes.frequency for all blocks without one")
-        no_sweep = block.begin == "sweep" and block.passage is None and "ramp" in axes.sweep
-        if no_sweep or (block.begin == "continue" and changed):
-            remedy = 'give "ramp": only blocks with the same keys of [scene] continue, and axes.sweep sweeps up or down'
-            yield Wrong(f"{key}.begin", block.begin, remedy)
-    for name in (*OWN_AXES, *(axis.name for axis in study.scene_axes)):
-        given = name not in OWN_AXES or name in axes.model_fields_set
-        if blocks and given and all(block.gives(name) for block in blocks):
-            yield Wrong(f"axes.{name}", None, f"leave it out: every block under [[mission]] gives its own {name}")
+def _keys(study: Study) -> Iterator[Wrong]:
+    """Keys are read by studies of this kind."""
+    kind = study.kind
+    for table, section in ((name, getattr(study, name)) for name in ("axes", "slow_time", "wear", "outputs")):
+        for key in type(section).model_fields:
+            if key in section.model_fields_set and not kind.is_read(table, key) and getattr(section, key) != ():
+                others = [each for each in KINDS.values() if each.is_read(table, key)]
+                given = " or ".join(f"{each.marker}, for {each.words}" for each in others if each.marker)
+                remedy = kind.why or f"leave it out, as {kind.words} do not read it, or give {given}"
+                yield Wrong(f"{table}.{key}", getattr(section, key), remedy)
 
 
 def _frequency(study: Study) -> Iterator[Wrong]:
     """The frequency is given once: in Hz, as a ratio, or as a resonance in a range."""
     axes, word, frequency = study.axes, _followed(study), list(study.axes.frequency or ())
     given = axes.model_fields_set & {"frequency", "frequency_ratio"}
-    if (study.kind is WEAR and not given) or len(given) > 1:
-        yield Wrong("axes.frequency", frequency or None, "give either it, in Hz, or frequency_ratio")
+    if len(given) > 1:
+        yield Wrong("axes.frequency", frequency, "give either it, in Hz, or frequency_ratio")
     if word is None and study.loading is not None:
         remedy = 'leave it out: it is the range of axes.frequency = "peak"'
         yield Wrong("loading", study.loading.model_dump(), remedy)
-    is_fixed = study.kind is MISSIONS or "ramp" in axes.sweep or "final" in axes.scheme
+    is_fixed = not study.kind.follows or "ramp" in axes.sweep or "final" in axes.scheme
     if word is not None and (is_fixed or len(frequency) > 1):
         remedy = f'give Hz: "{word}" stands alone, and goes with no mission, no sweep "ramp" and no scheme "final"'
         yield Wrong("axes.frequency", frequency, remedy)
@@ -81,13 +57,13 @@ def _followed(study: Study) -> str | None:
 
 def _outputs(study: Study) -> Iterator[Wrong]:
     """Variables are those of such a study, of different names, and of so many points at most."""
-    known = [*study.kind.asked, *(name for name in SCENE if name != "exact" or study.kind is WEAR)]
+    known = [*study.kind.asked, *study.kind.scene]
     of_pairs = study.scatter is not None and bool(study.scatter.of_pairs)
     no_exact = study.to_the_end or study.loading is not None or study.axes.frequency_ratio or of_pairs
     for name in study.outputs.variables:
         remedy = ""
-        if name not in (DEFAULT, *OF_A_HISTORY, *known):
-            remedy = f"give {nearest_name(name, known)}, for {study.kind.name}"
+        if name not in (DEFAULT, *study.kind.always, *known):
+            remedy = f"give {nearest_name(name, known)}, for {study.kind.words}"
         elif name in ("mesh", "exact") and (name not in study.scene.offers or (name == "exact" and no_exact)):
             remedy = f"leave it out: the scene {study.scene.model} has none"
             remedy += ", or not with these frequencies, cycle counts and pairs" if name == "exact" else ""
@@ -125,13 +101,13 @@ def _scatter(study: Study) -> Iterator[Wrong]:
     fields = type(study.scene.parameters).model_fields
     # numbers with fractions
     floats = [name for name, field in fields.items() if float in (field.annotation, *get_args(field.annotation))]
-    known = [*(NUMBERS if study.kind.counted else ()), *OF_PAIRS, *floats, *study.wear.numbers]
+    known = [*study.kind.numbers, *OF_PAIRS, *floats, *study.wear.numbers]
     limits = study.scatter and study.scatter.given_limits
-    if limits and (study.kind is MODES or study.slow_time.until is not None):
+    if limits and (not study.kind.counted or study.slow_time.until is not None):
         remedy = "leave it out: it asks for the wear after all cycles or missions, without slow_time.until"
         yield Wrong("scatter.limits", limits, remedy)
     for name, scattered in study.scatter.inputs.items() if study.scatter else ():
-        several = name in NUMBERS and len(getattr(study.axes, name) or ()) > 1
+        several = name in study.kind.numbers and len(getattr(study.axes, name) or ()) > 1
         giving = any(block.gives(name) for block in study.mission)
         if name not in known:
             yield Wrong(f"scatter.{name}", None, f"unknown input, give {nearest_name(name, known)}")

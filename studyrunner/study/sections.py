@@ -4,17 +4,13 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, cast
 
-from pydantic import AfterValidator, BaseModel, ConfigDict, Field
+from pydantic import AfterValidator, Field
 
 from solver.contact.wear_law import PowerTerms, WearLaw, WearTable
-from solver.settings import TARGETS, Followed, Passage
+from solver.settings import TARGETS, Followed
 from studies.scene import Unit
-from studyrunner.coordinates import SCENE
 from studyrunner.scatter import ScatterSection
-from studyrunner.study.mistakes import check_tables, nearest_name, raise_wrong
-from studyrunner.user_error import UserError
 from studyrunner.values import Axis, Fraction, Listed, NotNegative, Positive, Section, Whole, Wrong, ascending, once
-from studyrunner.variables import ASKED, OF_MISSIONS, OF_MODES
 
 AUTO: Final = "auto"
 """In place of a number of harmonics or samples: as many as each state needs for `rtol`."""
@@ -25,11 +21,7 @@ DEFAULT: Final = "default"
 SOLVER_AXES = ("harmonics", "samples", "tolerance", "rtol")
 """Keys of [solver] that may stand under [axes]."""
 
-VARIABLES = tuple(dict.fromkeys((*ASKED, *SCENE, *OF_MODES, *OF_MISSIONS)))
-"""All that `outputs.variables` may name, in the order of the result."""
-
 _OF_SURFACE = "surfaces_"
-_NO_KEYS_OF_BLOCKS = ("model", "worn", "mesh")
 _MOST_KNOTS = 1000
 
 
@@ -39,29 +31,16 @@ def _check_name(value: str) -> str:
     return value
 
 
-def _check_block_name(value: str) -> str:
-    if not value.strip() or not value.isprintable() or len(value) > 60 or "." in value:
-        raise ValueError("give a name of at most 60 characters without a point, in quotes")
-    return value
-
-
 def _check_target(value: dict[str, float]) -> dict[str, float]:
     if len(value) != 1 or next(iter(value)) not in TARGETS:
         raise ValueError("give one of " + ", ".join(f"{{{name} = ...}}" for name in TARGETS))
     return value
 
 
-def _check_passage(value: dict[str, float]) -> dict[str, float]:
-    if value.keys() != {"start", "stop", "rate"} or value["start"] == value["stop"]:
-        raise ValueError("give {start = Hz, stop = another Hz, rate = Hz/s} for a passage")
-    return {name: value[name] for name in ("start", "stop", "rate")}
-
-
 _Scheme = Literal["implicit", "explicit", "adaptive", "final"]
 _Samples = Annotated[Whole, Field(ge=4, le=100_000)]
 _Number = Annotated[Whole, Field(ge=1, le=1000)]
 _Knots = Annotated[Listed[float], Field(min_length=1, max_length=_MOST_KNOTS), AfterValidator(ascending)]
-_Passage = Annotated[dict[str, Positive], AfterValidator(_check_passage)]
 
 if TYPE_CHECKING:
     _Frequencies = tuple[float, ...]  # of a complete study
@@ -248,71 +227,6 @@ class LoadingSection(Section):
     )
 
 
-class MissionBlock(Section):
-    """A block of [[mission]]. Other keys are those of [scene] to which the block gives values of its own."""
-
-    model_config = ConfigDict(extra="allow")
-
-    name: Annotated[str, AfterValidator(_check_block_name)] = Field(
-        description="of the block, a coordinate of the result"
-    )
-    frequency: Positive | _Passage | None = Field(
-        None, description="Hz; or {start, stop, rate}: a passage, rate in Hz/s; or that of [axes]"
-    )
-    engine_order: Positive | None = Field(None, description="in place of frequency: order times rotation_speed / 60")
-    cycles: Positive | None = Field(None, description="of steady vibration in one mission; or seconds")
-    seconds: Positive | None = Field(None, description="s, of steady vibration in one mission; or cycles")
-    begin: Literal["ramp", "sweep", "continue"] = Field(
-        "ramp",
-        description="the excitation rises from the static state, a sweep as axes.sweep says, or the last state of the"
-        " block before",
-    )
-    excitation_amplitude: Positive | None = Field(None, description="N; or that of [axes]")
-
-    def rules(self) -> Iterator[Wrong]:
-        """A block has one frequency and one duration."""
-        if self.frequency is not None and self.engine_order is not None:
-            yield Wrong("engine_order", self.engine_order, "leave it out, or frequency: give one of both")
-        if self.passage is not None and (self.cycles or self.seconds or self.begin != "sweep"):
-            remedy = "leave out cycles, seconds and begin: a passage is a sweep, as long as its rate says"
-            yield Wrong("frequency", self.frequency, remedy)
-        if self.passage is None and (self.cycles is None) == (self.seconds is None):
-            yield Wrong("cycles", self.cycles, "give either cycles or seconds, the duration of the block in a mission")
-
-    @property
-    def parameters(self) -> dict[str, Any]:
-        """Keys of [scene] to which the block gives values of its own."""
-        return self.model_extra or {}
-
-    @property
-    def passage(self) -> Passage | None:
-        """The frequencies that it passes; None where the vibration is steady."""
-        return Passage(**self.frequency) if isinstance(self.frequency, dict) else None
-
-    def gives(self, name: str) -> bool:
-        """Whether the block gives a value of its own to an axis."""
-        own = self.engine_order is not None and name == "frequency"
-        return own or name in self.parameters or (name in OWN_AXES and getattr(self, name) is not None)
-
-    def cycles_at(self, frequency: float) -> float:
-        """Cycles of the block in one mission. frequency: of steady vibration, Hz."""
-        if self.passage is not None:
-            return self.passage.cycles
-        return self.cycles if self.cycles is not None else (self.seconds or 0.0) * frequency
-
-    def describe(self, frequency: float) -> str:
-        """In words. frequency: of steady vibration, Hz."""
-        cycles = f"{self.cycles_at(frequency):.4g} cycles a mission"
-        if self.passage is not None:
-            ends = f"{self.passage.start:g} to {self.passage.stop:g} Hz"
-            return f"passage from {ends} at {self.passage.rate:g} Hz/s, {cycles}"
-        how = "continues the block before" if self.begin == "continue" else f"begins with a {self.begin}"
-        return f"{frequency:g} Hz, {cycles}, {how}"
-
-
-OWN_AXES = tuple(name for name in AxesSection.model_fields if name in MissionBlock.model_fields)
-"""Axes of a study that a block may give a value of its own."""
-
 SECTIONS: dict[str, type[Section]] = {
     "study": StudySection,
     "axes": AxesSection,
@@ -323,31 +237,3 @@ SECTIONS: dict[str, type[Section]] = {
     "scatter": ScatterSection,
     "loading": LoadingSection,
 }
-
-
-def read_blocks(given: object, scene: type[BaseModel], source: str) -> tuple[MissionBlock, ...]:
-    """The blocks of a study file, each right in itself; values of keys of [scene] are not looked at.
-
-    given: what stands under `mission`. scene: what [scene] of this model consists of. Raises UserError.
-    """
-    if not isinstance(given, list) or not given or not all(isinstance(block, dict) for block in given):
-        raise UserError(source, "mission", given, "give blocks in order, each under a line [[mission]]")
-    tables: dict[str, Any] = {}
-    for number, table in enumerate(given):
-        name = table.get("name")
-        place = f"mission.{name if isinstance(name, str) and name.isprintable() and name else number}"
-        if place in tables:
-            raise UserError(source, "mission.name", name, "give each block a name of its own")
-        tables[place] = {"begin": "sweep", **table} if isinstance(table.get("frequency"), dict) else table
-    blocks = check_tables(dict.fromkeys(tables, MissionBlock), tables, source)
-    known = [*MissionBlock.model_fields, *(name for name in scene.model_fields if name not in _NO_KEYS_OF_BLOCKS)]
-    raise_wrong(
-        source,
-        (
-            Wrong(f"{place}.{key}", value, f"unknown key of a block, give {nearest_name(key, known)}")
-            for place, block in blocks.items()
-            for key, value in block.parameters.items()
-            if key not in known
-        ),
-    )
-    return tuple(blocks.values())

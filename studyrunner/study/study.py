@@ -1,16 +1,17 @@
-"""The study: what a study file says, checked, frozen and with every default filled in; the three kinds of study."""
+"""The study: what a study file says, checked, frozen and with every default filled in."""
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from pydantic import Field, InstanceOf
 
 from solver.settings import TARGETS, FollowedFrequency, WearTarget
-from studyrunner import variables
 from studyrunner.coordinates import POINT, SAMPLE, SCENE
+from studyrunner.kinds.kind import Kind
+from studyrunner.kinds.wear.kind import COUNTS, LOOPS
 from studyrunner.scatter import ScatterSection
 from studyrunner.study import sections
 from studyrunner.study.design import Design
@@ -18,95 +19,13 @@ from studyrunner.study.scene_axes import SceneAxis
 from studyrunner.study.scene_section import SceneSection
 from studyrunner.study.text import Archived
 from studyrunner.values import Section
-
-
-@dataclass(frozen=True)
-class Kind:
-    """A kind of study.
-
-    name: what its points are. about: what a result holds, of a {scene}. time: how well the time of a run is known.
-    axes: those of the result that are neither keys of the solver, of [scene] and [wear], nor samples, in their order.
-    asked, always: variables that its points may have, and that its result always holds. usual, of_samples: those where
-    the study names none, and where samples are drawn. counted: what the slow time counts; empty where nothing wears.
-    unused: keys without a use, by table. why: the remedy where one is given.
-    """
-
-    name: str
-    about: str
-    time: str
-    axes: tuple[str, ...]
-    asked: Mapping[str, variables.Variable]
-    always: Mapping[str, variables.Variable]
-    usual: tuple[str, ...]
-    of_samples: tuple[str, ...]
-    counted: str = ""
-    unused: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    why: str = ""
-
-
-def _other_axes(*axes: str) -> tuple[str, ...]:
-    return tuple(name for name in sections.AxesSection.model_fields if name not in axes)
-
-
-_OF_MODES = ("mode", "sweep")
-_OF_MISSIONS = _other_axes("frequency_ratio", "step", "scheme", "modal_amplitude", "mode")
-
-NUMBERS = tuple(name for name in _OF_MISSIONS if name != "sweep")
-"""Axes that hold numbers of the joint and of its excitation, which may scatter."""
-
-WEAR = Kind(
-    "wear histories",
-    "Fretting wear of a joint under vibration: wear histories of the scene {scene}. Wear depths and worn volume,"
-    " contact pressures and slip, vibration, and the errors of each.",
-    "to a factor of two, if every point wears; a point whose vibration jumps takes up to five times as long",
-    _other_axes("frequency_ratio", "modal_amplitude", "mode"),
-    variables.ASKED,
-    variables.OF_A_HISTORY,
-    variables.USUAL,
-    variables.OF_SAMPLES,
-    "cycle",
-)
-MODES = Kind(
-    "nonlinear modes",
-    "Nonlinear modes of a joint: natural frequency and damping over the amplitude, scene {scene}.",
-    "to a factor of three; a mode that is lost at a large amplitude takes longer",
-    _OF_MODES,
-    variables.OF_MODES,
-    variables.OF_A_MODE_POINT,
-    tuple(variables.OF_MODES),
-    tuple(variables.OF_MODES),
-    unused={
-        "axes": _other_axes(*_OF_MODES, "modal_amplitude"),
-        "slow_time": tuple(sections.SlowTimeSection.model_fields),
-        "wear": tuple(sections.WearSection.model_fields),
-        "outputs": ("loops",),
-    },
-    why="leave it out: with axes.modal_amplitude nothing is excited and nothing wears",
-)
-MISSIONS = Kind(
-    "missions",
-    "Fretting wear of a joint over missions: scene {scene}. Worn volume by block, wear depths, vibration, and the"
-    " errors of each.",
-    "to a factor of three, if every block wears",
-    _OF_MISSIONS,
-    variables.OF_MISSIONS,
-    variables.OF_A_MISSION,
-    variables.OF_MISSIONS_BY_DEFAULT,
-    variables.OF_SAMPLED_MISSIONS,
-    "mission",
-    {
-        "axes": _other_axes(*_OF_MISSIONS, "mode"),
-        "slow_time": ("cycles", "final_share", "largest_depth"),
-        "outputs": ("loops",),
-    },
-    "leave it out: slow_time.missions counts in place of cycles, and missions choose their own steps",
-)
+from studyrunner.variables import Variable
 
 
 class Study(Section):
     """A whole study.
 
-    - mission: blocks in order; none where each point has one vibration.
+    - kind: which kind of study this is. tables: what marks it, by name, as `mission`.
     - block_studies: for each block a study of this block alone.
     - follow: what the frequency of the excitation follows; None where it is given.
     - source, folder: file of the study as the user named it, and its folder.
@@ -126,7 +45,8 @@ class Study(Section):
     outputs: sections.OutputsSection = sections.OutputsSection()
     scatter: ScatterSection | None = None
     loading: sections.LoadingSection | None = None
-    mission: tuple[sections.MissionBlock, ...] = ()
+    tables: dict[str, Any] = Field({}, description="of its kind alone")
+    kind: InstanceOf[Kind] = Field(exclude=True)
     block_studies: tuple["Study", ...] = Field((), exclude=True)
     follow: FollowedFrequency | None = Field(None, exclude=True)
     source: str = Field(exclude=True)
@@ -138,15 +58,15 @@ class Study(Section):
     design: InstanceOf[Design] | None = Field(None, exclude=True)
 
     @property
-    def kind(self) -> Kind:
-        """Which kind of study this is."""
-        return MISSIONS if self.mission else MODES if self.axes.modal_amplitude is not None else WEAR
+    def mission(self) -> tuple[Any, ...]:
+        """Blocks in order; none where each point has one vibration."""
+        return tuple(self.tables.get("mission", ()))
 
     @property
-    def recorded(self) -> Mapping[str, variables.Variable]:
+    def recorded(self) -> Mapping[str, Variable]:
         """Variables of its points, beside those that every result holds."""
         asked = {name: entry for name, entry in self.kind.asked.items() if name in self.outputs.variables}
-        return asked | (variables.LOOPS if self.outputs.loops else {}) | (variables.COUNTS if self.to_the_end else {})
+        return asked | (LOOPS if self.outputs.loops else {}) | (COUNTS if self.to_the_end else {})
 
     @property
     def scene_variables(self) -> tuple[str, ...]:
@@ -188,7 +108,7 @@ class Study(Section):
             return tuple(map(float, range(outputs)))
         steps = max(1, outputs - 1)
         spaced = (end * position / steps for position in range(steps))
-        return tuple(sorted({*(map(float, map(round, spaced)) if self.mission else spaced), end}))
+        return tuple(sorted({*(map(float, map(round, spaced)) if self.kind.whole else spaced), end}))
 
     @property
     def given_harmonics(self) -> tuple[int, ...]:
@@ -205,9 +125,9 @@ class Study(Section):
         found: dict[str, Sequence[float | str]] = {name: getattr(table, name) or () for name, table in own.items()}
         found |= {axis.name: axis.values for axis in self.scene_axes}
         found |= {} if self.scatter is None else {SAMPLE: range(self.scatter.n_rows)}
-        if self.axes.modal_amplitude is not None:
+        if not self.kind.counted:
             worn = found.pop("cycle", (0.0,))
-            found |= {"modal_amplitude": self.axes.modal_amplitude, "cycle": worn}
+            found |= {name: getattr(self.axes, name) for name in self.kind.last_axes} | {"cycle": worn}
         if self.design is None:
             return found
         left = {name: values for name, values in found.items() if name not in self.design.columns}
@@ -222,6 +142,6 @@ class Study(Section):
     def own_axes(self) -> tuple[str, ...]:
         """Names of the axes that are neither keys of [scene] or [wear] nor samples."""
         # those of which every block of a mission gives a value of its own are none
-        idle = [name for name in sections.OWN_AXES if self.mission and all(block.gives(name) for block in self.mission)]
+        idle = [name for name in self.kind.axes if self.mission and all(block.gives(name) for block in self.mission)]
         several = [key for key in sections.SOLVER_AXES if key in self.solver_axes or len(getattr(self.solver, key)) > 1]
         return (*(name for name in self.kind.axes if name not in idle), *several)

@@ -12,7 +12,9 @@ from pydantic import BaseModel
 
 from solver.settings import FOLLOWED, Followed, FollowedFrequency
 from studies.hdf5 import is_hdf5
-from studyrunner.coordinates import COORDINATES
+from studyrunner.coordinates import COORDINATES, SCENE
+from studyrunner.kinds.table import KINDS
+from studyrunner.kinds.wear.kind import FOLLOWED_FREQUENCY
 from studyrunner.scatter import flat_table
 from studyrunner.study import scene_axes, sections
 from studyrunner.study.design import Design, read_archived_design, read_design
@@ -21,11 +23,10 @@ from studyrunner.study.overrides import override, with_design
 from studyrunner.study.room import with_room_for_wear
 from studyrunner.study.rules import broken_rules
 from studyrunner.study.scene_section import WORN_AXIS, Origin, SceneSection, find_scene, parameters_of, read_worn
-from studyrunner.study.study import MODES, Study
+from studyrunner.study.study import Study
 from studyrunner.study.text import format_toml, read_archived, read_toml
 from studyrunner.user_error import UserError, Verbatim
 from studyrunner.values import listed
-from studyrunner.variables import FOLLOWED_FREQUENCY
 
 _IDLE_FREQUENCY = 1.0  # Hz, where no point has a frequency of the axis
 _ON_REQUEST = ("scatter", "loading")
@@ -97,10 +98,11 @@ def _study_path(argument: str) -> Path:
 def _tables_of(table: Mapping[str, object], source: str) -> scene_axes.Tables:
     """The tables of a study file, those that are always read as empty ones; copies, in which keys may be changed."""
     tables: scene_axes.Tables = {name: {} for name in sections.SECTIONS if name not in _ON_REQUEST} | {"scene": {}}
+    of_kinds = [kind.table for kind in KINDS.values() if kind.table]
     for name, section in table.items():
-        if (meant := nearest_name(name, (*sections.SECTIONS, "scene", "mission"))) != name:
+        if (meant := nearest_name(name, (*sections.SECTIONS, "scene", *of_kinds))) != name:
             raise UserError(source, name, section, f"unknown table, give {meant}")
-        if name != "mission" and not isinstance(section, dict):
+        if name not in of_kinds and not isinstance(section, dict):
             raise UserError(source, name, section, f"give a table [{name}] with keys")
         tables[name] = dict(section) if isinstance(section, dict) else section
     if "scatter" in tables:
@@ -132,26 +134,33 @@ def _check_study(table: Mapping[str, object], origin: Origin, design: Design | N
     """
     source, tables = origin.source, _tables_of(table, origin.source)
     model, worn = tables["scene"].pop("model", None), tables["scene"].pop("worn", None)
-    kind = parameters_of(model, source, origin.path.parent if origin.archived is None else None)
+    parameters = parameters_of(model, source, origin.path.parent if origin.archived is None else None)
+    kind, *others = [each for each in KINDS.values() if each.is_in(tables)] or KINDS.values()
+    if kind.marker and others:
+        remedy = f"leave it out, or {others[0].marker}: a study is of {kind.words} or of {others[0].words}"
+        raise UserError(source, kind.marker, None, remedy)
     worn = None if worn is None else read_worn(worn, source, origin.path.parent)
     solver_axes = tuple(key for key in sections.SOLVER_AXES if key in tables["axes"])
-    axes = scene_axes.take_axes(tables, kind, source, design)
-    blocks = sections.read_blocks(tables.pop("mission"), kind, source) if "mission" in tables else ()
+    axes = scene_axes.take_axes(tables, parameters, source, design)
+    of_kind: dict[str, Any] = {}
+    if kind.table:
+        of_kind = {kind.table: kind.part("rules").read_table(tables.pop(kind.table), parameters, source)}
     if any(each in FOLLOWED for each in listed(tables["axes"].get("frequency"))):
         tables.setdefault("loading", {})
-    kinds: dict[str, type[BaseModel]] = {name: each for name, each in sections.SECTIONS.items() if name in tables}
+    classes: dict[str, type[BaseModel]] = {name: each for name, each in sections.SECTIONS.items() if name in tables}
     with keys_as_given({**scene_axes.keys_below_axes(axes), **{f"solver.{key}": f"axes.{key}" for key in solver_axes}}):
         variants, studies = [*scene_axes.variants_of(tables, axes, design)], list[Study]()
-        given_tables = check_tables({**kinds, "scene": kind}, {**tables, **variants[0]}, source)
+        given_tables = check_tables({**classes, "scene": parameters}, {**tables, **variants[0]}, source)
         worn_axis: tuple[scene_axes.SceneAxis, ...] = ()
         if worn is not None and worn.cycle:
-            name = "cycle" if given_tables["axes"].modal_amplitude else WORN_AXIS
+            name = WORN_AXIS if kind.counted else "cycle"
             meaning = "number of vibration cycles that have worn the joint before"
             worn_axis = (scene_axes.SceneAxis(name, "scene", ("worn",), worn.cycle, "1", meaning),)
-        fixed = {"mission": blocks, "source": source, "folder": origin.path.parent, "archived": origin.archived}
-        fixed |= {"solver_axes": solver_axes, "scene_axes": (*axes, *worn_axis), "design": design}
+        fixed = {"source": source, "folder": origin.path.parent, "archived": origin.archived}
+        fixed |= {"kind": kind, "tables": of_kind, "solver_axes": solver_axes}
+        fixed |= {"scene_axes": (*axes, *worn_axis), "design": design}
         for given in variants:
-            checked = check_tables({"scene": kind, "wear": sections.WearSection}, given, source)
+            checked = check_tables({"scene": parameters, "wear": sections.WearSection}, given, source)
             for state in (None,) if worn is None else worn.states():
                 scene = SceneSection(model=model, parameters=checked["scene"], worn=state)
                 known = studies[0].scene if studies else None
@@ -176,7 +185,8 @@ def _with_block_studies(study: Study, given: Mapping[str, Any], origin: Origin) 
             of_block = find_scene(
                 SceneSection(model=scene.model, parameters=parameters, worn=scene.worn), origin, scene
             )
-        own = {name: (getattr(block, name),) for name in sections.OWN_AXES if isinstance(getattr(block, name), float)}
+        values = {name: getattr(block, name, None) for name in study.kind.numbers}
+        own = {name: (value,) for name, value in values.items() if isinstance(value, float)}
         if block.engine_order is not None:
             speed, key = dict(parameters).get("rotation_speed"), f"mission.{block.name}.engine_order"
             if not isinstance(speed, int | float) or speed <= 0.0:
@@ -184,8 +194,8 @@ def _with_block_studies(study: Study, given: Mapping[str, Any], origin: Origin) 
                 raise UserError(source, key, block.engine_order, remedy)
             own["frequency"] = (block.engine_order * float(speed) / 60.0,)
         axes = study.axes.model_copy(update={"frequency": study.axes.frequency or (_IDLE_FREQUENCY,), **own})
-        update = {"mission": (), "slow_time": sections.SlowTimeSection(), "scene": of_block, "axes": axes}
-        studies.append(study.model_copy(update=update))
+        update = {"slow_time": sections.SlowTimeSection(), "scene": of_block, "axes": axes}
+        studies.append(study.model_copy(update={"kind": KINDS["wear"], "tables": {}, **update}))
     return study.model_copy(update={"block_studies": tuple(studies)})
 
 
@@ -207,11 +217,10 @@ def _complete(study: Study) -> Study:
         names |= {"mesh"} & {*study.scene.offers}
     if study.scatter is not None and study.scatter.given_limits:
         names |= {"worn_volume", "worn_volume_error", "wear_depth_max", "wear_depth_max_error"}
-    outputs = study.outputs.model_copy(
-        update={"variables": tuple(name for name in sections.VARIABLES if name in names)}
-    )
+    known = dict.fromkeys((*KINDS["wear"].asked, *SCENE, *kind.asked))
+    outputs = study.outputs.model_copy(update={"variables": tuple(name for name in known if name in names)})
     update |= {"axes": axes.model_copy(update={"frequency": frequency}), "outputs": outputs}
-    update |= {"slow_time": sections.SlowTimeSection(cycles=0.0)} if kind is MODES else {}
+    update |= {"slow_time": sections.SlowTimeSection(cycles=0.0)} if not kind.counted else {}
     update["block_studies"] = tuple(each.model_copy(update={"outputs": outputs}) for each in study.block_studies)
     return with_room_for_wear(study.model_copy(update=update))
 
@@ -225,7 +234,7 @@ def format_study(study: Study) -> str:
     chosen = {key for key in own if key not in names and any(other[key] != own[key] for other in others)}
     kept = {key: value for key, value in tables["scene"]["parameters"].items() if key not in chosen}
     tables["scene"] = {"model": study.scene.model, **kept, "worn": _worn_states(study)}
-    used = {*study.own_axes, "modal_amplitude", "frequency_ratio"}
+    used = {*study.own_axes, *study.kind.last_axes, *study.kind.other_axes}
     used -= set() if study.axes.frequency_ratio is None else {"frequency"}
     designed = {} if study.design is None else study.design.columns
     axes = tables["axes"] = {name: values for name, values in tables["axes"].items() if name in used}
@@ -247,8 +256,8 @@ def format_study(study: Study) -> str:
         else:
             (tables["solver"][key],) = tables["solver"][key]
     for table in ("slow_time", "wear"):
-        for key in study.kind.unused.get(table, ()):
-            del tables[table][key]
+        tables[table] = {key: value for key, value in tables[table].items() if study.kind.is_read(table, key)}
+    tables |= tables.pop("tables")
     if study.design is not None:
         tables["axes"] = {name: values for name, values in axes.items() if name not in designed}
         tables["points"] = {"columns": [column.key for column in designed.values()]}

@@ -12,13 +12,13 @@ import numpy as np
 import xarray as xr
 
 from solver.outcome import COMPLETE, SENSITIVE_ERROR, Outcome
+from studyrunner.kinds.wear.kind import OWN_STEPS
 from studyrunner.result.opening import as_history, describe_outcome
 from studyrunner.result.pairs import contact_pairs
 from studyrunner.result.view import Result
 from studyrunner.summary.findings import LEAST_ERROR, Finding, what_came_out, where_is
 from studyrunner.system.progress import count
 from studyrunner.units import scale_for, show_number, show_percent, show_rtol
-from studyrunner.variables import OWN_STEPS
 
 MOST_ROWS, MOST_COLUMNS = 9, 100
 
@@ -93,7 +93,7 @@ def summarise(result: Result) -> Summary:
     stuck = result.dataset["stuck_frequency"].values if result.has("stuck_frequency") else np.array(math.nan)
     resonance = float(stuck) if stuck.ndim == 0 else math.nan
     findings, doubts = [*what_came_out(result, resonance)], list[str]()
-    if not result.has_modes:
+    if result.kind.counted:
         doubts += [_not_small(result), _too_far(result), _too_few_counts(result)]
     wore = not any(each.name == "wear" and each.values.get("worn_volume") == 0.0 for each in findings)
     findings += [*(Finding("doubt", "beware", doubt) for doubt in doubts if doubt), *_failures(result)]
@@ -206,7 +206,7 @@ def certainty_of(result: Result, *, wore: bool = True) -> Finding | None:
     """
     responses = result.has("response_error") and result.blocks is None
     has_errors = result.has("error_estimate") and np.isfinite(result.rtol).any() and result.computed.any()
-    if result.has_modes:
+    if not result.kind.counted:
         # the largest of natural frequency and damping ratio
         of, errors = "point", np.zeros(result.computed.shape)
         for name in ("natural_frequency", "damping_ratio"):

@@ -61,7 +61,7 @@ def _known(value: float, error: float, units: str) -> str:
 
 def what_came_out(result: Result, stuck: float) -> Iterator[Finding]:
     """The answer: wear, response, life, meshes, or modes. stuck: first frequency with the joint stuck, Hz, or NaN."""
-    if result.has_modes:
+    if not result.kind.counted:
         yield from itertools.islice(_mode_ranges(result), _MOST_MODES)
         return
     yield from _wear_and_response(result, stuck)

@@ -28,7 +28,7 @@ from types import SimpleNamespace
 import numpy as np
 
 from studyrunner.kinds.task import PointResult, Result, StartResult, Task, TaskPlan
-from studyrunner.kinds.wear import History, Sweep
+from studyrunner.kinds.wear.histories import History, Sweep
 from studyrunner.mpi.dispatch import Dispatcher
 from studyrunner.study.study_file import read_study
 from studyrunner.task_runs import StudyRun

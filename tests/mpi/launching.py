@@ -19,7 +19,7 @@ import pytest
 import xarray as xr
 
 from studyrunner.cli import main
-from studyrunner.kinds.wear import History, Sweep
+from studyrunner.kinds.wear.histories import History, Sweep
 
 FAKED = str(Path(__file__).with_name("run_faked.py"))
 ROOT = Path(__file__).parents[2]

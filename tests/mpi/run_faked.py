@@ -26,7 +26,7 @@ sys.path.insert(0, str(Path(__file__).parents[2]))
 from solver.packing import Packed
 from studyrunner.cli import main
 from studyrunner.kinds.task import Keep, PointResult, Result, Task
-from studyrunner.kinds.wear import History, Sweep
+from studyrunner.kinds.wear.histories import History, Sweep
 from studyrunner.mpi import schedule
 from studyrunner.mpi.ranks import launcher_rank
 from studyrunner.scene.scene import SceneFacts, describe_scene

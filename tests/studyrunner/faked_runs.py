@@ -14,7 +14,7 @@ from solver.results.history import WearHistory
 from solver.settings import Passage
 from solver.wear.slow_time import Guide
 from studyrunner.kinds.task import Keep, PointResult, Result, Task
-from studyrunner.kinds.wear import History, Sweep
+from studyrunner.kinds.wear.histories import History, Sweep
 from studyrunner.scene.scene import describe_scene
 from tests.studyrunner.fakes import fake_evaluate
 

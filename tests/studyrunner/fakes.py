@@ -15,12 +15,12 @@ from solver.settings import Resolution
 from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.checkpoint.store import Store
 from studyrunner.kinds.task import PointResult, Result, StartResult, Task, TaskPlan
-from studyrunner.kinds.wear import History, Sweep
+from studyrunner.kinds.wear.histories import History, Sweep
+from studyrunner.kinds.wear.kind import ASKED, LOOP_COMPONENTS, LOOP_PHASES, LOOPS, OF_A_HISTORY
 from studyrunner.plan import build_tasks
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.study import Study
-from studyrunner.variables import ASKED, LOOP_COMPONENTS, LOOP_PHASES, LOOPS, OF_A_HISTORY
 
 PAIRS = ContactInterface(
     dofs=np.arange(6).reshape(2, 3),

@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from solver.outcome import Outcome
 from studyrunner.coordinates import COORDINATES
 from studyrunner.kinds.task import PointResult
+from studyrunner.kinds.wear.kind import ASKED, LOOP_COMPONENTS, LOOPS, OF_A_HISTORY, OF_SAMPLES, USUAL
 from studyrunner.result.arrays import attributes, coordinates
 from studyrunner.result.provenance import describe_run
 from studyrunner.result.view import Result, open_for_report
@@ -27,7 +28,7 @@ from studyrunner.scene.scene import SceneFacts, variable_sizes
 from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.study import Study
 from studyrunner.study.text import POINTS_LEFT
-from studyrunner.variables import ASKED, LOOP_COMPONENTS, LOOPS, OF_A_HISTORY, OF_SAMPLES, USUAL, Variable
+from studyrunner.variables import Variable
 from tests.studyrunner.fakes import FACTS
 
 AXES: Mapping[str, Sequence[object]] = {

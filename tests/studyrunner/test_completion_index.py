@@ -15,7 +15,7 @@ from solver.packing import Packed
 from studyrunner.checkpoint.completion_index import MOST_CRASHES
 from studyrunner.checkpoint.store import RESULTS
 from studyrunner.kinds.task import Identity
-from studyrunner.kinds.wear import Sweep
+from studyrunner.kinds.wear.histories import Sweep
 from studyrunner.study.study_file import read_study
 from studyrunner.system.machine import package_digest
 from studyrunner.task_runs import StudyRun

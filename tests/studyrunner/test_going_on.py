@@ -17,7 +17,7 @@ from studyrunner import cli
 from studyrunner.checkpoint import store
 from studyrunner.checkpoint.completion_index import CompletionIndex
 from studyrunner.cli import main
-from studyrunner.kinds.wear import History, Sweep
+from studyrunner.kinds.wear.histories import History, Sweep
 from studyrunner.mpi import schedule
 from studyrunner.result import write
 from studyrunner.user_error import UserError

@@ -9,11 +9,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from studyrunner.cli import main
+from studyrunner.kinds.wear.kind import USUAL
 from studyrunner.study.sections import SOLVER_AXES
 from studyrunner.study.study_file import format_study, read_study
 from studyrunner.study.text import format_toml, read_toml
 from studyrunner.user_error import UserError
-from studyrunner.variables import USUAL
 from tests.studies.fe_models.decks import SECTOR
 from tests.studyrunner.small_studies import FOLLOWED, MISSIONS, MODES, SAMPLES, SLIDER, TO_THE_END, write_depths
 

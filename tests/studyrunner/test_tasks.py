@@ -13,10 +13,10 @@ from solver.packing import pack
 from solver.results.history import StartState
 from solver.settings import Resolution
 from studyrunner.cli import main
-from studyrunner.kinds.wear import build_result
+from studyrunner.kinds.wear.histories import build_result
+from studyrunner.kinds.wear.kind import ASKED, USUAL
 from studyrunner.plan import doubts_of_study, effort_of
 from studyrunner.study.study_file import bundled_studies, read_study
-from studyrunner.variables import ASKED, USUAL
 from tests.mpi.launching import options, results
 from tests.studyrunner.faked_runs import history
 from tests.studyrunner.fakes import FACTS, changed, plan_of, points_of, totals_of, without_values

@@ -6,11 +6,11 @@ import pytest
 from studyrunner import open_result
 from studyrunner.accessor import join_results
 from studyrunner.cli import main
+from studyrunner.kinds.wear.kind import CERTIFICATE, LOOPS, OF_A_HISTORY, USUAL
 from studyrunner.report.figures.wear import draw_excitation
 from studyrunner.result.view import open_for_report
 from studyrunner.study.study_file import read_study
 from studyrunner.summary.answer import summary
-from studyrunner.variables import CERTIFICATE, LOOPS, OF_A_HISTORY, USUAL
 from tests.mpi.launching import options
 from tests.studyrunner.fakes import plan_of
 from tests.studyrunner.small_studies import UNWORN, compute

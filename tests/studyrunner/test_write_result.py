@@ -17,6 +17,7 @@ import xarray as xr
 from studyrunner.accessor import FretwearAccessor
 from studyrunner.cli import main
 from studyrunner.coordinates import COORDINATES
+from studyrunner.kinds.wear.kind import ASKED, LOOPS, OF_A_HISTORY
 from studyrunner.result import write as writing
 from studyrunner.result.arrays import coordinates
 from studyrunner.result.provenance import describe_run
@@ -25,7 +26,6 @@ from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.study_file import read_study
 from studyrunner.system import machine
 from studyrunner.user_error import StorageError
-from studyrunner.variables import ASKED, LOOPS, OF_A_HISTORY
 from tests.mpi.launching import options
 from tests.studyrunner.fakes import FACTS, fake_completion, fake_history, plan_of, started, without_values
 from tests.studyrunner.results import build_dataset, write_dataset

@@ -13,6 +13,7 @@ from matplotlib.patches import Patch
 
 from solver.outcome import Outcome, absolute
 from studyrunner.coordinates import POINT, SAMPLE
+from studyrunner.kinds.wear.kind import CERTIFICATE
 from studyrunner.report import drawing as plot
 from studyrunner.report.drawing import COLOURS, Drawn, FloatArray, Table, as_sentences
 from studyrunner.report.selection import choose, find_course, slow_time, spans_decades
@@ -21,7 +22,6 @@ from studyrunner.result.view import NO_VOLUME, Result
 from studyrunner.statistics.sentences import describe_ranking, measure_of
 from studyrunner.system.progress import count
 from studyrunner.units import Scale, scale_for, show_cycles, show_known, show_number, units_of
-from studyrunner.variables import CERTIFICATE
 
 _PLAIN = ("frequency", "scheme", SAMPLE, POINT)
 _MOST_AXES, _SMALL = 6, 7.5

@@ -11,10 +11,10 @@ from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
+from studyrunner.kinds.wear.kind import OWN_STEPS
 from studyrunner.report.drawing import Drawn, FloatArray, add_legend, line_style, new_panels, set_log
 from studyrunner.result.view import NO_VOLUME, Result
 from studyrunner.units import show_number, show_percent
-from studyrunner.variables import OWN_STEPS
 
 QUANTITIES = {"volume": "final worn volume", "response": "response at the end"}
 """What is compared, in words."""

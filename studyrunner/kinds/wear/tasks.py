@@ -19,10 +19,11 @@ from solver.contact.wear_law import WearLaw
 from solver.settings import ToTheEnd
 from studyrunner.kinds.estimate import iterations_of_histories, iterations_of_sweep, seconds_of
 from studyrunner.kinds.task import EQUAL_POINTS, TaskPlan, Work, n_unknowns_of
-from studyrunner.kinds.wear import Excitation, History, Integrated, Sweep
+from studyrunner.kinds.wear.histories import Excitation, History, Integrated, Sweep
+from studyrunner.kinds.wear.kind import OWN_STEPS
 from studyrunner.points.table import Points
 from studyrunner.study.study import Study
-from studyrunner.variables import OWN_STEPS
+from studyrunner.system.progress import count
 
 MOST_TOGETHER = 4
 """Histories of one task, which share the adaptive history that given steps are compared with. It takes about as long as
@@ -232,3 +233,25 @@ def _together(study: Study, shared: Sequence[_Shared]) -> Iterator[_Together]:
             cycles = 0.0 if integrated[0].unworn else math.inf if study.to_the_end else study.output_counts[-1]
             iterations = iterations_of_histories([(each.scheme, each.step) for each in integrated], cycles)
             yield _Together(integrated, tuple(itertools.chain.from_iterable(points)), iterations)
+
+
+def effort_words(n_of: Mapping[str, int], n_results: Mapping[str, int]) -> Iterator[str]:
+    """What is computed, in words, from the numbers of tasks and of results by what they do."""
+    if n_starts := n_results["sweep"] + n_results["ramp"]:
+        by = " and ".join(count(n_of[way], way) for way in ("sweep", "ramp") if n_of[way])
+        yield f"{count(n_starts, 'start state')} by {by}"
+    if n_results["history"]:
+        yield count(n_results["history"], "wear history", "wear histories")
+
+
+def plan_rows(study: Study) -> Iterator[tuple[str, str]]:
+    """Rows of a plan on the frequency that is followed, and on the cycles."""
+    n_stored, end = len(study.output_counts), study.output_counts[-1]
+    if study.follow is not None:
+        what = f"{study.follow.of}, found between {study.follow.low:g} and {study.follow.high:g} Hz by the sweep"
+        yield "frequency", what if end == 0.0 else f"{what} and followed while the joint wears"
+    if study.to_the_end:
+        until = f"until the wear rate of every pair is below {study.slow_time.final_share:g} of its largest"
+        yield "cycles", f"{until}; {n_stored} states are stored, spaced evenly in worn volume and cycles"
+    else:
+        yield "cycles", f"{end:g}, of which {count(n_stored, 'count is', 'counts are')} stored"

@@ -15,10 +15,11 @@ from solver.packing import Packed
 from solver.settings import Direction, Passage, WearTarget
 from studyrunner.kinds import task as tasks
 from studyrunner.kinds.estimate import iterations_of_missions, missions_computed, seconds_of
+from studyrunner.kinds.missions.kind import OF_A_MISSION
 from studyrunner.kinds.results import deepest, describe_target, first_harmonic, named
 from studyrunner.points.table import Points
 from studyrunner.study.study import Study
-from studyrunner.variables import OF_A_MISSION
+from studyrunner.system.progress import count
 
 if TYPE_CHECKING:
     from solver.missions.mission import MissionHistory
@@ -180,3 +181,17 @@ def _values(task: Mission, history: "MissionHistory") -> dict[str, Any]:
         "message": "; ".join(filter(None, (history.message, target))),
     }
     return named((*task.variables, *OF_A_MISSION), own, history)
+
+
+def effort_words(n_of: Mapping[str, int], n_results: Mapping[str, int]) -> Iterator[str]:
+    """What is computed, in words, from the numbers of tasks and of results by what they do."""
+    if n_results["mission"]:
+        yield f"{count(n_of['mission'], 'mission history', 'mission histories')}, each computed by one rank"
+
+
+def plan_rows(study: Study) -> Iterator[tuple[str, str]]:
+    """Rows of a plan on the missions, and on each block."""
+    n_stored = count(len(study.output_counts), "number is", "numbers are")
+    yield "missions", f"{study.slow_time.missions}, of which {n_stored} stored"
+    for block, own in zip(study.mission, study.block_studies, strict=True):
+        yield "block", f"{block.name}: {block.describe(max(own.axes.frequency))}"

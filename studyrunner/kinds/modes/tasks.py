@@ -9,10 +9,11 @@ import numpy as np
 from solver.model import ReducedModel
 from studyrunner.kinds import task as tasks
 from studyrunner.kinds.estimate import iterations_of_mode, seconds_of
+from studyrunner.kinds.modes.kind import OF_A_MODE_POINT
 from studyrunner.kinds.results import first_harmonic, named
 from studyrunner.points.table import Points
 from studyrunner.study.study import Study
-from studyrunner.variables import OF_A_MODE_POINT
+from studyrunner.system.progress import count
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -85,3 +86,14 @@ def build_tasks(study: Study, points: Points, n_displacements: Sequence[int]) ->
         )
         found[task] = [amplitudes[amplitude] for amplitude in task.amplitudes]
     return tasks.number_points(found, points.n)
+
+
+def effort_words(n_of: Mapping[str, int], n_results: Mapping[str, int]) -> Iterator[str]:
+    """What is computed, in words, from the numbers of tasks and of results by what they do."""
+    if n_of["mode"]:
+        yield f"{count(n_of['mode'], 'nonlinear mode')} over the amplitude, {count(n_results['mode'], 'point')}"
+
+
+def plan_rows(study: Study) -> tuple[tuple[str, str], ...]:  # noqa: ARG001
+    """No rows of a plan: a mode has no slow time."""
+    return ()

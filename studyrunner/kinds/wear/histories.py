@@ -17,9 +17,9 @@ from solver.packing import Packed, pack, unpack
 from solver.settings import FollowedFrequency, Resolution, ToTheEnd, WearTarget
 from studyrunner.kinds.results import deepest, describe_target, first_harmonic, named
 from studyrunner.kinds.task import Identity, Keep, PointResult, StartResult, Task, TaskJoint, Work, digest, up_or_down
+from studyrunner.kinds.wear.kind import OF_A_HISTORY, OWN_STEPS
 from studyrunner.mpi.dispatch import CostKeys
 from studyrunner.units import describe_reach
-from studyrunner.variables import OF_A_HISTORY, OWN_STEPS
 
 if TYPE_CHECKING:
     from solver.results.history import WearHistory
