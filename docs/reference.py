@@ -19,7 +19,7 @@ from studyrunner.coordinates import COORDINATES, SCENE, STUCK_FREQUENCY
 from studyrunner.kinds.missions.kind import OF_A_MISSION, OF_MISSIONS
 from studyrunner.kinds.modes.kind import OF_A_MODE_POINT, OF_MODES
 from studyrunner.kinds.wear.kind import ASKED, COUNTS, LOOPS, OF_A_HISTORY
-from studyrunner.report.contents import CAPTIONS, FIGURES
+from studyrunner.report.contents import all_figures
 from studyrunner.study.keys import key_list
 from studyrunner.summary.answer import ADVICE
 from studyrunner.variables import Variable
@@ -49,8 +49,8 @@ def reference() -> str:
         "Figures of a report": _table(
             ("file", "shows", "how to read it"),
             (
-                (f"`{each.name}`", each.title.format(slow="cycles", over="frequency"), CAPTIONS.get(each.name, ""))
-                for each in FIGURES
+                (f"`{each.name}`", each.title.format(slow="cycles", over="frequency"), each.caption)
+                for each in all_figures()
             ),
         ),
         "Keywords of decks": _keywords(),

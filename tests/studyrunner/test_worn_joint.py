@@ -12,9 +12,9 @@ from solver.outcome import Outcome
 from studies import build_scene, read_scene
 from studyrunner import UserError, compute_worn_joint, read_study, run_study
 from studyrunner.cli import main
+from studyrunner.kinds.wear import figures
 from studyrunner.points.table import points_of
 from studyrunner.report import cli as report
-from studyrunner.report import contents
 from studyrunner.scene.answers import write_study_scene
 from studyrunner.scene.scene import build_study_scene, describe_scene
 from studyrunner.scene.scene_set import find_scenes
@@ -56,8 +56,8 @@ def test_loops_and_responses_are_those_of_studies_that_ask_for_them(path, tmp_pa
 
 @pytest.mark.slow
 def test_the_command_draws_what_it_computes_and_says_what_is_wrong(path, tmp_path, monkeypatch, capsys):
-    both = [entry for entry in contents.FIGURES if entry.name in ("frequency_response", "fretting_loops")]
-    monkeypatch.setattr(contents, "FIGURES", both)
+    both = [entry for entry in figures.FIGURES if entry.name in ("frequency_response", "fretting_loops")]
+    monkeypatch.setattr(figures, "FIGURES", both)
     assert report.main([str(path), "-o", str(tmp_path), "--loops", "0"]) == 0
     assert "worn by" in (tmp_path / "index.html").read_text(encoding="utf-8")
     assert (tmp_path / "fretting_loops.csv").exists()

@@ -1,4 +1,4 @@
-"""How the joint vibrates: response over frequency (Fig. 9 of the paper), modes, loops of pairs (Figs. 13 to 15)."""
+"""How the joint vibrates: response over frequency (Fig. 9 of the paper), loops of pairs (Figs. 13 to 15)."""
 
 import textwrap
 from dataclasses import dataclass
@@ -19,7 +19,7 @@ from studyrunner.result.pairs import JOINT_WORDS, last_depth
 from studyrunner.result.view import NO_MOTION, Point, Result
 from studyrunner.units import scale_for
 
-_MOST_LINES, _MOST_RESPONSES, _MOST_MODES, _MOST_PAIRS = 3, 3, 6, 3
+_MOST_LINES, _MOST_RESPONSES, _MOST_PAIRS = 3, 3, 3
 _OF_WEAR = ("wear_coefficient", "step", "scheme")
 _BEFORE = "worn_cycle"
 _WORN: dict[str, Any] = {"color": COLOURS[1], "linestyle": (0, (5, 1.5)), "marker": "s", "markersize": 4.5}
@@ -35,7 +35,7 @@ _ROWS: dict[str, tuple[tuple[tuple[str, str], tuple[str, str]], ...]] = {
 }
 
 
-# --- over the frequency, and the amplitude of a mode ---
+# --- over the frequency ---
 
 
 @dataclass(frozen=True)
@@ -124,28 +124,6 @@ def _recomputed(curves: xr.Dataset) -> list[_Line]:
         values, error = (curve[f"response_{each}"].values for each in ("amplitude", "error"))
         lines.append(_Line(label, curves["frequency"].values, values, look, error))
     return lines
-
-
-def draw_mode(result: Result, name: str) -> Drawn:
-    """Natural frequency or damping ratio of modes over the amplitude with error bars, a line for each wear state."""
-    course = find_course(result, "modal_amplitude")
-    if course is None:
-        return "The study has one amplitude: give several under [axes] modal_amplitude."
-    choice = course.choose(_MOST_MODES, first=("cycle", "mode", "sweep"))
-    figure, panel = plot.new_panel(3.6)
-    values, has_errors = course.read(name, *choice.points), result.has(f"{name}_error")
-    errors = course.read(f"{name}_error", *choice.points) if has_errors else np.nan * values
-    for number, (label, line, error) in enumerate(zip(choice.labels, values, errors, strict=True)):
-        if np.isfinite(line).any():
-            look = course.line_style(number) | {"label": label or "mode"}
-            plot.add_line(panel, course.values, line, error, **look)
-    panel.set(xlabel=course.label, ylabel="natural frequency (Hz)" if name == "natural_frequency" else "damping ratio")
-    plot.set_log(panel.xaxis, float(course.values[0]), float(course.values[-1]))
-    low, high = float(np.nanmin(values, initial=np.inf)), float(np.nanmax(values, initial=-np.inf))
-    # negative damping, e.g. of the air, has no logarithm
-    if name == "damping_ratio" and 0.0 < low <= high:
-        plot.set_log(panel.yaxis, low, high, percent=True)
-    return figure, plot.mark_failed(panel, course.values, np.isnan(values)), choice.sentence
 
 
 # --- through a period ---

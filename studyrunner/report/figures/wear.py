@@ -1,8 +1,5 @@
-"""Worn volume and wear rate: over slow time (Fig. 4 of the paper), in the end (Fig. 8), as maps (Figs. 6, 7); and of
-missions by block, with the vibration of each block.
-"""
+"""Worn volume and wear rate: over slow time (Fig. 4 of the paper), in the end (Fig. 8), as maps (Figs. 6, 7)."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -12,23 +9,12 @@ from matplotlib.colors import Normalize
 from solver.outcome import Outcome, absolute
 from studyrunner.report import drawing as plot
 from studyrunner.report import selection
-from studyrunner.report.drawing import Drawn, FloatArray, Table
+from studyrunner.report.drawing import Drawn, FloatArray
 from studyrunner.result.view import NO_VOLUME, Point, Result
-from studyrunner.units import Scale, scale_for, show_known, show_number, show_percent
+from studyrunner.units import Scale, scale_for, show_known, show_percent
 
 _MOST_LINES, _MOST_MAPS = 6, 4
 _LARGE: dict[str, Any] = {"linestyle": "none", "markersize": 9, "markerfacecolor": "none", "color": "black"}
-
-LISTED = (
-    *("excitation_frequency_begin", "excitation_frequency", "block_cycles", "sweep_rate"),
-    *("block_worn_volume", "block_worn_volume_error"),
-)
-SHARES = {"block_share": "share of the wear in a mission", "block_worn_volume": "worn volume"}
-RESPONSES = {
-    "response_amplitude_begin": "amplitude at the beginning",
-    "response_amplitude": "amplitude at the end",
-}
-"""Variables of the blocks that are drawn, in words."""
 
 
 # --- over slow time ---
@@ -189,50 +175,3 @@ def draw_map(result: Result, name: str) -> Drawn:
     plot.add_colour_bar(figure, panels, norm, scale.label(name.replace("_", " ")))
     text = f"{scale.show(float(largest), 4)} at {course.at(place)}, {result.cycle_label(count)}"
     return figure, selection.labelled(f"Largest: {text}", choice.labels[number]), choice.sentence
-
-
-# --- of missions, by block ---
-
-
-def list_blocks(result: Result) -> Drawn:
-    """Frequency, cycles, worn volume with its error, and share of each block at the last number of missions."""
-    assert result.blocks is not None
-    blocks = result.blocks.isel(result.shown, missing_dims="ignore")
-    reached = np.flatnonzero(np.isfinite(blocks["block_worn_volume"].values).all(axis=1))
-    last, rows = int(reached[-1]) if reached.size else 0, []
-    blocks = blocks.isel(cycle=last)
-    worn = blocks["block_worn_volume"].values
-    scale, total = scale_for("m3", worn), float(worn.sum())
-    for name, *values in zip(blocks["block"].values, *(blocks[name].values for name in LISTED), strict=True):
-        begin, end, cycles, rate, volume, error = map(float, values)
-        amount = scale.show(volume, 4) + show_known(error) if reached.size else "-"
-        share = show_percent(volume / total) if total > NO_VOLUME else "-"
-        frequency = " to ".join(dict.fromkeys(map(show_number, (begin, end))))
-        passage = f"{rate:.2g}" if rate > 0.0 else "-"
-        rows.append((str(name), frequency, show_number(cycles, 4), amount, share, passage))
-    columns = ("block", "frequency (Hz)", "cycles", "worn volume", "share", "rate over (zeta f)²")
-    return Table(columns, tuple(rows), f"Wear after {result.cycle_label(last)}." if reached.size else "")
-
-
-def draw_blocks(result: Result, names: Mapping[str, str]) -> Drawn:
-    """Variables of the blocks at the shown point over the missions: a panel a variable, a line a block."""
-    assert result.blocks is not None
-    blocks = result.blocks.isel(result.shown, missing_dims="ignore")
-    if len(result.cycles) == 1 or not np.nanmax(blocks[list(names)[-1]].values, initial=0.0) > NO_VOLUME:
-        return None
-    figure, panels = plot.new_panels(2, 1, 5.6, sharex=True)
-    for panel, (name, words) in zip(panels[:, 0], names.items(), strict=True):
-        values = blocks[name].isel(response=0, missing_dims="ignore").values
-        wrong = "response_error" if "response" in blocks[name].dims else f"{name}_error"
-        unit = str(blocks[name].attrs.get("units", "1"))
-        scale = Scale(100.0, "%") if unit == "1" else scale_for(unit, values)
-        for place, block in enumerate(blocks["block"].values):
-            line = scale(values[:, place])
-            error = blocks[wrong].values[:, place] * line if wrong in blocks else None
-            look = plot.line_style(place, line.size) | {"label": str(block)}
-            plot.add_line(panel, result.cycles, line, error, band=True, **look)
-        plot.set_from_zero(panel, float(np.nanmax(scale(values), initial=0.0)))
-        panel.set_ylabel(scale.label(words))
-    panels[-1, 0].set(xlabel="missions", xlim=(0.0, result.cycles[-1]))
-    of_first = names is RESPONSES and len(result.responses) > 1
-    return figure, f"Of {result.responses[0]}; the others are in the file" if of_first else ""

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from studies.finite_element.pairing import ContactPairs
 from studies.scene import SurfaceMesh
 from studies.scenes.dovetail_sector import Parameters
-from studyrunner.report.contents import FIGURES
+from studyrunner.report.contents import all_figures
 from studyrunner.report.drawing import COLUMN_WIDTH, WIDTH, Drawing, fit_into_column, plotted_values, style
 from studyrunner.result.view import Result
 from tests.studyrunner.results import build_file
@@ -24,7 +24,7 @@ STUDY = '[study]\nname = "s"\n[scene]\nmodel = "dovetail_sector"\nn_sectors = 47
 
 
 def draw_figure(result: Result, name: str, width: float = WIDTH) -> Drawing:
-    found = next(entry for entry in FIGURES if entry.name == name).make(result, width)
+    found = next(entry for entry in all_figures() if entry.name == name).make(result, width)
     assert isinstance(found, Drawing)
     return found
 
