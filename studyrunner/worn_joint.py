@@ -37,7 +37,7 @@ _HOW = (
 def has_worn_response(result: Result) -> bool:
     """Whether a result is one of wear histories, of which something is worn, over frequencies or at the resonance."""
     several = "frequency" in result.varying or "frequency_ratio" in result.varying or bool(result.followed)
-    needed = result.has("worn_volume", "response_amplitude") and result.kind.counted == "cycle"
+    needed = result.has("worn_volume", "response_amplitude")
     return needed and several and bool(np.nanmax(result.worn, initial=0.0) > NO_VOLUME)
 
 

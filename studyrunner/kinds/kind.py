@@ -78,7 +78,7 @@ class Kind:
 
         - "rules": `broken_rules(study)`, of a kind with a table its class `TABLE` and `read_table`;
         - "tasks": `build_tasks(study, points, n_displacements)`, `effort_words`, `plan_rows(study)`;
-        - "findings": `what_came_out(result, stuck)`, `certainty(result, wore)`;
+        - "findings": `what_came_out(result, stuck)`, `errors_of(result, wore)`;
         - "figures": `FIGURES`, in the order of the page.
         """
         return import_module(f"{__package__}.{self.name}.{name}")

@@ -10,13 +10,14 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
+from numpy.typing import NDArray
 
 from solver.outcome import COMPLETE, SENSITIVE_ERROR, Outcome
 from studyrunner.kinds.wear.kind import OWN_STEPS
 from studyrunner.result.opening import as_history, describe_outcome
 from studyrunner.result.pairs import contact_pairs
 from studyrunner.result.view import Result
-from studyrunner.summary.findings import LEAST_ERROR, Finding, what_came_out, where_is
+from studyrunner.summary.findings import LEAST_ERROR, Finding, where_is
 from studyrunner.system.progress import count
 from studyrunner.units import scale_for, show_number, show_percent, show_rtol
 
@@ -92,7 +93,7 @@ def summarise(result: Result) -> Summary:
     """The summary of a result that is opened for the report."""
     stuck = result.dataset["stuck_frequency"].values if result.has("stuck_frequency") else np.array(math.nan)
     resonance = float(stuck) if stuck.ndim == 0 else math.nan
-    findings, doubts = [*what_came_out(result, resonance)], list[str]()
+    findings, doubts = [*result.kind.part("findings").what_came_out(result, resonance)], list[str]()
     if result.kind.counted:
         doubts += [_not_small(result), _too_far(result), _too_few_counts(result)]
     wore = not any(each.name == "wear" and each.values.get("worn_volume") == 0.0 for each in findings)
@@ -204,21 +205,10 @@ def certainty_of(result: Result, *, wore: bool = True) -> Finding | None:
     Values: n_known to rtol, n_less and n_unknown, inf or without an estimate, of the points computed to the end; worst:
     the largest relative error, NaN without one; rtol: NaN where it is an axis.
     """
-    responses = result.has("response_error") and result.blocks is None
-    has_errors = result.has("error_estimate") and np.isfinite(result.rtol).any() and result.computed.any()
-    if not result.kind.counted:
-        # the largest of natural frequency and damping ratio
-        of, errors = "point", np.zeros(result.computed.shape)
-        for name in ("natural_frequency", "damping_ratio"):
-            if result.has(name, f"{name}_error"):
-                value, error = np.abs(result.dataset[name].values), result.dataset[f"{name}_error"].values
-                errors = np.maximum(errors, np.where(value > 0.0, error / np.where(value > 0.0, value, 1.0), 0.0))
-    elif result.wears and has_errors and (wore or not responses):
-        of, errors = "worn volume", result.errors
-    elif responses:
-        of, errors = "response", result.of_points("response_error", -1)
-    else:
+    found: tuple[str, NDArray[np.float64]] | None = result.kind.part("findings").errors_of(result, wore=wore)
+    if found is None:
         return None
+    of, errors = found
     known, above = result.computed & np.isfinite(errors), result.computed & (errors > result.rtol)
     masks = {"n_known": known & ~above, "n_less": known & above, "n_unknown": result.computed & ~np.isfinite(errors)}
     values: dict[str, Any] = {name: int(np.count_nonzero(mask)) for name, mask in masks.items()}

@@ -1,32 +1,19 @@
-"""What came out of a study, a finding each: the most wear or why nothing wore, the response, life, meshes, modes.
+"""One line of a summary, a finding, and the words in which it says numbers and points.
 
-Only results are in it: a history that was not computed to the end, or is known to a factor of two only, has no number.
+Only results are in findings: a history that was not computed to the end, or is known to a factor of two only, has no
+number.
 """
 
-import itertools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-import numpy as np
-import xarray as xr
-
-from solver.outcome import SENSITIVE_ERROR, Outcome, absolute
-from studyrunner.coordinates import POINT, SAMPLE
-from studyrunner.result.pairs import contact_pairs, has_depths, last_depth
-from studyrunner.result.view import NO_MOTION, NO_VOLUME, Point, Result
-from studyrunner.statistics.sentences import describe_limit, describe_ranking, describe_volumes
-from studyrunner.system.progress import count
-from studyrunner.units import scale_for, show_cycles, show_known, show_number, show_percent
+from studyrunner.result.view import Point, Result
+from studyrunner.units import scale_for, show_known
 
 LEAST_ERROR = 1e-4
 """Relative error that is shown, of any smaller one."""
-
-_MOST_MODES = 4
-_MOST_ALIKE = 3
-_SHARE = 0.5
-"""Of the wear of a surface that lies at its edge: more, and more than its share of the area, is pointed out."""
 
 
 @dataclass(frozen=True)
@@ -47,293 +34,14 @@ def where_is(result: Result, point: Point) -> str:
     return result.describe(point, result.varying or ("frequency",)) or "the only point"
 
 
-def _show(value: float, units: str) -> str:
+def show(value: float, units: str) -> str:
+    """A number in SI with a prefix of its unit."""
     return scale_for(units, value).show(value)
 
 
-def _known(value: float, error: float, units: str) -> str:
+def with_error(value: float, error: float, units: str) -> str:
     """A number with its error: "1.52 mm3 ± 1.3 %"."""
     if math.isnan(value):
         return "not known"
     # of nothing only whether it is known
-    return _show(value, units) + show_known(max(error / value, LEAST_ERROR) if value > 0.0 else 0.0 * error)
-
-
-def what_came_out(result: Result, stuck: float) -> Iterator[Finding]:
-    """The answer: wear, response, life, meshes, or modes. stuck: first frequency with the joint stuck, Hz, or NaN."""
-    if not result.kind.counted:
-        yield from itertools.islice(_mode_ranges(result), _MOST_MODES)
-        return
-    yield from _wear_and_response(result, stuck)
-    yield from filter(None, (_shortest_life(result), compare_meshes(result)))
-
-
-# --- wear and vibration ---
-
-
-def _wear_and_response(result: Result, stuck: float) -> Iterator[Finding]:
-    """The point that wears most, of points that differ in numerical settings only the best known one; its response.
-
-    Where no wear is known, the response of the point that figures show. stuck: first frequency with the joint stuck,
-    Hz, NaN where it is not known.
-    """
-    best, point, wears = result.best_known, result.shown, False
-    if result.has("worn_volume"):
-        # of a selection of cycle counts, or where the target comes before the second of them
-        best = best & np.isfinite(result.worn)
-    resonance = f"first resonance {stuck:.4g} Hz when all pairs stick" if math.isfinite(stuck) else ""
-    if result.wears and result.has("worn_volume") and best.any():
-        worn = np.where(best, result.worn, -1.0)
-        wears = float(worn.max()) > NO_VOLUME
-        point = result.largest(worn) if wears else point
-        yield from _of_wear(result, point) if wears else [_nothing(result, resonance)]
-    elif result.wears and result.has("worn_volume", "error_estimate") and result.computed.any():
-        yield Finding("wear", "wear", "no worn volume is known within 50 %")
-    yield from _of_limits(result)
-    if result.blocks is None and result.has("response_amplitude") and result.computed[result.place(point)]:
-        yield _response(result, point, wears, resonance)
-
-
-def _of_wear(result: Result, point: dict[str, int]) -> Iterator[Finding]:
-    place, at, where = result.place(point), result.last_reached(point), where_is(result, point)
-    volume, end = float(result.worn[place]), float(result.counts(point)[at])
-    error = volume * float(result.errors[place])
-    # points that differ in more than steps
-    known = xr.DataArray(result.best_known, dims=result.axes).any(result.numerical).values
-    n_compared, n_left_out = int(known.sum()), int(known.size - known.sum())
-    text = f"{_known(volume, error, 'm3')} after {show_cycles(end, result.counted)} at {where}"
-    if n_left_out:
-        more = f"{count(n_left_out, 'case')} without a known volume"
-        best = f"the most of {n_compared} cases" if n_compared > 1 else "the only known case"
-        text += f", {best}; {more} may wear more"
-    volumes, ranking = _of_samples(result)
-    values = {"point": point, "worn_volume": volume, "error": error, "count": end}
-    values |= {"n_compared": n_compared, "n_left_out": n_left_out}
-    yield Finding("wear", "wear" if volumes or n_compared == 1 else "most wear", volumes or text, values)
-    if ranking:
-        yield Finding("input", "input", ranking)
-    yield _deepest(result, point, at, f" in the sample that wears most ({where})" if volumes else "")
-    if result.blocks is not None and "block_worn_volume" in result.blocks:
-        worn = result.blocks["block_worn_volume"].isel(point).isel(cycle=at)
-        shares = dict(zip(worn["block"].values.tolist(), (worn.values / volume).tolist(), strict=True))
-        text = ", ".join(f"{name} {show_percent(share)}" for name, share in shares.items())
-        yield Finding("blocks", "blocks", f"share of the wear: {text}", shares)
-
-
-def _of_samples(result: Result) -> tuple[str, str]:
-    """Worn volumes of the samples where their median is largest, and which input decides; empty without samples."""
-    if result.statistics is None:
-        return "", ""
-    last = result.statistics.isel(cycle=-1, missing_dims="ignore")
-    medians = last["worn_volume_quantile"].sel(quantile=0.5).isel(bound=0)
-    there, where = _chosen(result, last, int(np.argmax(medians.values)), "with the largest median")
-    return f"{describe_volumes(there)} after {result.cycle_label(-1)}{where}", describe_ranking(there)
-
-
-def _of_limits(result: Result) -> Iterator[Finding]:
-    """The probability of each limit, where it is least."""
-    last = xr.Dataset() if result.statistics is None else result.statistics.isel(cycle=-1, missing_dims="ignore")
-    texts, values = list[str](), dict[str, Any]()
-    for name in ("wear_depth", "worn_volume"):
-        if f"{name}_limit" in last:
-            least = int(np.argmin(last[f"{name}_below_limit_interval"].isel(bound=0).values))
-            there, where = _chosen(result, last, least, "that is least probable")
-            texts.append(describe_limit(there, name) + where)
-            parts = {"limit": "limit", "probability": "below_limit", "interval": "below_limit_interval"}
-            values[name] = {key: there[f"{name}_{each}"].values.tolist() for key, each in parts.items()}
-            values[name]["n_unknown"] = int(there[f"{name}_not_placed"])
-    if texts:
-        yield Finding("limits", "limits", f"after {result.cycle_label(-1)}: {'; '.join(texts)}", values)
-
-
-def _chosen(result: Result, last: xr.Dataset, flat: int, why: str) -> tuple[xr.Dataset, str]:
-    """Statistics of the point of this number, and in words where it is. why: it is chosen."""
-    sizes = last["n_without_value"].sizes
-    place = np.unravel_index(flat, tuple(sizes.values()))
-    point = dict(zip(map(str, sizes), map(int, place), strict=True))
-    where = result.describe(point, [name for name in result.varying if name != SAMPLE])
-    n_points = last["n_without_value"].size
-    more = f" (of {n_points} points the one {why})" if n_points > 1 else ""
-    return last.isel(point), (f", at {where}" if where else "") + more
-
-
-def _deepest(result: Result, point: Point, at: int, where: str) -> Finding:
-    """The deepest pair of a point, and whether most is worn at the edge of its surface."""
-
-    def read(name: str, *index: int) -> float:
-        return float(result.at(name, point, at).values[index]) if result.has(name) else math.nan
-
-    if not has_depths(result):
-        depth = read("largest_wear_depth")
-        return Finding("deepest", "deepest", _known(depth, math.nan, "m") + where, {"wear_depth": depth})
-    depths = np.nan_to_num(last_depth(result, point), nan=0.0)
-    pair, pairs, numbers = int(np.argmax(depths)), contact_pairs(result, point), result.dataset["contact"].values
-    error = read("wear_depth_error", pair) if result.has("wear_depth_error") else read("wear_depth_max_error")
-    surface = str(pairs.surface[pair]) if result.has("contact_surface") else ""
-    number, place = int(numbers[pair]), pairs.position[pair].tolist()
-    text = f"{_known(depths[pair], error, 'm')} at contact pair {number}" + (f" of {surface}" if surface else "")
-    if np.isfinite(place).all():
-        text += f", (x, y, z) = ({', '.join(f'{1e3 * each:.4g}' for each in place)}) mm"
-    # mirror pairs, for one
-    least = depths[pair] * (1.0 - LEAST_ERROR) - (error if error < SENSITIVE_ERROR * depths[pair] else 0.0)
-    also = [int(number) for number in numbers[depths >= least] if number != numbers[pair]]
-    if also:
-        more = f" and {len(also) - _MOST_ALIKE} others" if len(also) > _MOST_ALIKE else ""
-        text += f"; as deep within the error: pair {', '.join(map(str, also[:_MOST_ALIKE]))}{more}"
-    text, share = text + where, math.nan
-    if result.has("contact_surface", "contact_area", "contact_edge"):
-        on_it = pairs.surface == surface
-        edge = on_it & (result.at("contact_edge", point).values != 0)
-        if edge.any() and depths[on_it].any():
-            share, of_area = (each[edge].sum() / each[on_it].sum() for each in (depths * pairs.area, pairs.area))
-            if share > max(_SHARE, of_area):
-                text += f"; {show_percent(share)} of the wear of {surface} is in edge pairs:"
-                text += " valid if the real contact ends there, else extend the model"
-    values = {"wear_depth": float(depths[pair]), "error": error, "contact": number, "also": also, "surface": surface}
-    return Finding("deepest", "deepest", text, values | {"position": place, "edge_share": float(share)})
-
-
-def _nothing(result: Result, resonance: str) -> Finding:
-    """Why no point whose worn volume is known wears."""
-    slip, why, used = math.nan, "", math.nan
-    if result.has("slip_range"):
-        largest = result.over_points("slip_range", lambda values: np.nan_to_num(values).max(axis=-1))
-        slip = float(largest[result.best_known].max())
-        slip = slip if slip >= NO_MOTION else 0.0
-        why = f": pairs slip by up to {_show(slip, 'm')} without wear" if slip else ": all pairs stick"
-    n_points, n_known = result.usable.size, int(np.count_nonzero(result.usable))
-    where = f"at all {n_points} points" if n_points > 1 else f"at {where_is(result, result.shown)}"
-    if n_known < n_points:
-        where = f"at {n_known} of {count(n_points, 'point')}, the worn volume of the others is not known"
-    if not slip and result.has("friction_use"):
-        used = float(result.of_points("friction_use", 0)[result.best_known].max())
-        where += f", with at most {show_percent(used)} of the friction that they can bear" if used > 0.0 else ""
-    text = f"nothing wore{why} {where}" + (f" ({resonance})" if resonance else "")
-    return Finding("wear", "wear", text, {"worn_volume": 0.0, "largest_slip": slip, "friction_use": used})
-
-
-def _response(result: Result, point: Point, wears: bool, resonance: str) -> Finding:
-    """Amplitudes of the response that is largest at a point, new and worn; NaN where known to a factor of two only."""
-    ends = [0, result.last_reached(point)]
-    amplitude = result.at("response_amplitude", point, ends).transpose("cycle", "response").values
-    of = int(np.argmax(amplitude[0]))
-    both = np.where(amplitude[:, of] > NO_MOTION, amplitude[:, of], 0.0)
-    wrong = result.at("response_error", point, ends).values if result.has("response_error") else np.full(2, np.nan)
-    both = np.where((wrong > SENSITIVE_ERROR) & (both > 0.0), np.nan, both)
-    errors, name = absolute(wrong, both), result.responses[of]
-    new, worn = (_known(value, error, "m") for value, error in zip(both.tolist(), errors.tolist(), strict=True))
-    values: dict[str, Any] = {"response": name, "amplitude": both.tolist(), "error": errors.tolist()}
-    if result.followed and result.has("excitation_frequency"):
-        start, end = result.at("excitation_frequency", point, ends).values.tolist()
-        has_error = result.has("excitation_frequency_error")
-        error = float(result.at("excitation_frequency_error", point, ends[1])) if has_error else math.nan
-        shown = f"{end:.6g}" + (f" ± {error:.2g}" if math.isfinite(error) else " (error not known)" * has_error)
-        moved = f"moved from {start:.6g} to {shown} Hz" if wears else f"at {start:.6g} Hz"
-        text = f"{moved}, response of {name} {new}" + (f" to {worn}" if wears else "")
-        values |= {"frequency": [start, end], "frequency_error": error}
-        return Finding("response", result.followed, text, values)
-    if not both.any():
-        return Finding("response", "response", f"{name} does not move", values)
-    case = " at this point" if wears else f", most at {where_is(result, point)}"
-    text = f"{name}{case if result.computed.size > 1 else ''}: amplitude {new}"
-    if wears:
-        text += f" when new, {worn} when worn"
-    frequency, peak = _peak(result, point, of)
-    if math.isfinite(frequency):
-        text += f"; the new joint responds most at {frequency:.6g} Hz ({_show(peak, 'm')})"
-    if wears and resonance:
-        follow = 'the moving resonance was not computed: axes.frequency = "resonance" follows it'
-        text += f"; {resonance}; {follow}" if "frequency" in result.axes else f"; {resonance}"
-    return Finding("response", "response", text, values | {"peak": frequency})
-
-
-def _peak(result: Result, point: Point, of: int) -> tuple[float, float]:
-    """Frequency, Hz, and amplitude, m, of the largest response of the unworn joint; NaN at the ends of the range."""
-    if result.dataset.sizes.get("frequency", 1) < 3:
-        return math.nan, math.nan
-    others = {name: index for name, index in point.items() if name != "frequency"}
-    row = result.at("response_amplitude", others, 0).isel(response=of)
-    there = result.has_values[tuple(others.get(name, slice(None)) for name in result.axes)]
-    order = np.argsort(row["frequency"].values)
-    values = np.where(there, row.values, np.nan)[order]
-    top = 0 if np.isnan(values).all() else int(np.nanargmax(values))
-    if not 0 < top < len(values) - 1 or np.isnan(values[top - 1 : top + 2]).any():
-        return math.nan, math.nan
-    return float(row["frequency"].values[order][top]), float(values[top])
-
-
-# --- modes, life, meshes ---
-
-
-def _mode_ranges(result: Result) -> Iterator[Finding]:
-    """Of each mode the ends of natural frequency and damping ratio over the points where it was found."""
-    varying = [name for name in result.varying if name not in ("mode", POINT)]
-    numbers = [name for name in varying if result.dataset[name].dtype.kind in "iuf"]
-    ends = {name: [show_number(float(result.dataset[name].values[place])) for place in (0, -1)] for name in numbers}
-    over = ", ".join(f"{name.replace('_', ' ')} {' to '.join(each)}" for name, each in ends.items())
-    axis, shown = result.axes.index("mode"), {"natural_frequency": (1.0, 6, " Hz"), "damping_ratio": (100.0, 3, " %")}
-    for index, number in enumerate(result.dataset["mode"].values.tolist()):
-        computed = result.computed.take(index, axis=axis)
-        values: dict[str, Any] = {"n_found": int(computed.sum())}
-        ranges = []
-        for name, (factor, digits, unit) in shown.items():
-            if result.has(name) and computed.any():
-                of_mode = result.dataset[name].values.take(index, axis=axis)[computed]
-                values[name] = [float(of_mode.min()), float(of_mode.max())]
-                texts = dict.fromkeys(f"{factor * each:.{digits}g}" for each in values[name])
-                ranges.append(f"{name.replace('_', ' ')} {' to '.join(texts)}{unit}")
-        text = ", ".join(ranges) + (f" over {over}" if ranges and over else "")
-        if not ranges or not computed.all():
-            text += f"{', ' if text else ''}found at {values['n_found']} of {count(computed.size, 'point')}"
-        yield Finding(f"mode {number}", f"mode {number}", text, values)
-
-
-def _shortest_life(result: Result) -> Finding | None:
-    """The shortest life of the points of a study with a target; None without a target."""
-    until = result.study.get("slow_time", {}).get("until")
-    if not isinstance(until, dict) or not result.has("cycles_to_target"):
-        return None
-    (quantity, target), *_ = until.items()
-    ended = result.computed & ~result.ended(Outcome.SENSITIVE) & ~np.isinf(result.errors)
-    lives, errors = (result.dataset[name].values for name in ("cycles_to_target", "cycles_to_target_error"))
-    unknown = ended & (errors > SENSITIVE_ERROR * lives)
-    n_beyond, n_unsure = int(np.count_nonzero(ended & np.isnan(lives))), int(np.count_nonzero(unknown))
-    lives = np.where(ended & ~unknown, lives, np.nan)
-    units = {"wear_depth": "m", "worn_volume": "m3"}.get(quantity, "1")
-    reaches = f"{quantity.replace('_', ' ')} {_show(target, units)}"
-    unsure = f"the life of {count(n_unsure, 'point')} is not known" if n_unsure else ""
-    values = {"target": target, "count": math.nan, "n_beyond": n_beyond, "n_unsure": n_unsure}
-    if np.isnan(lives).all():
-        none = f"no {'other ' if unsure else ''}point computed to the end reaches {reaches}"
-        text = "; ".join(filter(None, ("" if unsure and not n_beyond else none, unsure)))
-        return Finding("life", "life", text, values)
-    point = result.largest(-np.nan_to_num(lives, nan=np.inf))
-    life, error = (float(each[result.place(point)]) for each in (lives, errors))
-    known = show_known(error / life if life > 0.0 else math.nan)
-    text = f"{show_cycles(round(life), result.counted)}{known} to {reaches} at {where_is(result, point)}"
-    text += f"; {unsure}" if unsure else ""
-    text += f"; not reached by {count(n_beyond, 'point')}" if n_beyond else ""
-    return Finding("life", "life", text, values | {"count": life, "error": error, "point": point})
-
-
-def compare_meshes(result: Result) -> Finding | None:
-    """How far worn volumes of the two finest meshes are apart, at equal distance to the resonance; else None.
-
-    The resonance moves with the mesh: at one frequency one mesh may wear a multiple of the other.
-    """
-    at = f"at the {result.followed}" if result.followed else ""
-    at = at or ("at equal frequency ratio" if "frequency_ratio" in result.axes else "")
-    if not at or "mesh" not in result.varying or not result.wears or not result.has("worn_volume"):
-        return None
-    meshes, axis = result.dataset["mesh"].values.astype(float), result.axes.index("mesh")
-    two = np.argsort(meshes)[-2:]
-    volumes = np.where(result.best_known, result.worn, np.nan).take(two, axis=axis)
-    larger = np.fmax.reduce(volumes, axis=axis)
-    apart = np.abs(np.diff(volumes, axis=axis).squeeze(axis)) / np.where(larger > NO_VOLUME, larger, np.nan)
-    if np.isnan(apart).all():
-        return None
-    median, largest = float(np.nanmedian(apart)), float(np.nanmax(apart))
-    coarse, fine = (show_number(each) for each in meshes[two].tolist())
-    text = f"worn volumes of meshes {coarse} and {fine} differ by {show_percent(median)} {at}"
-    text += f", at most {show_percent(largest)}" if largest > median else ""
-    return Finding("mesh", "mesh", text, {"meshes": meshes[two].tolist(), "median": median, "largest": largest})
+    return show(value, units) + show_known(max(error / value, LEAST_ERROR) if value > 0.0 else 0.0 * error)

@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 
 from solver.outcome import Outcome
+from studyrunner.kinds.wear.findings import compare_meshes
 from studyrunner.report.page import _facts as page_facts
 from studyrunner.result.opening import as_history
 from studyrunner.result.view import Result
 from studyrunner.study.study_file import read_study
 from studyrunner.summary.answer import MOST_COLUMNS, MOST_ROWS, SMALL, summary
-from studyrunner.summary.findings import Finding, compare_meshes
+from studyrunner.summary.findings import Finding
 from studyrunner.units import show_percent, show_rtol
 from tests.studyrunner.fakes import FACTS, plan_of
 from tests.studyrunner.results import result_of_study

@@ -92,7 +92,7 @@ def compare_settings(result: Result) -> tuple[ComparedPoint, ...]:
     """
     varying = [key for key in KEYS if key in result.varying]
     alone = set(varying) <= {"scheme"} and not result.has("exact_worn_volume")
-    if alone or result.blocks is not None or not result.has("worn_volume", "response_amplitude"):
+    if alone or not result.has("worn_volume", "response_amplitude"):
         return ()
     keys, others = ([name for name in result.axes if (name in KEYS) == each] for each in (True, False))
     settings = _list_settings(result, keys)
