@@ -16,9 +16,7 @@ from studies.fe_models.from_files.parameters import Parameters
 from studies.scene import list_keys
 from studies.scenes import BUNDLED, scene_help
 from studyrunner.coordinates import COORDINATES, SCENE, STUCK_FREQUENCY
-from studyrunner.kinds.missions.kind import OF_A_MISSION, OF_MISSIONS
-from studyrunner.kinds.modes.kind import OF_A_MODE_POINT, OF_MODES
-from studyrunner.kinds.wear.kind import ASKED, COUNTS, LOOPS, OF_A_HISTORY
+from studyrunner.kinds.table import KINDS
 from studyrunner.report.contents import all_figures
 from studyrunner.study.keys import key_list
 from studyrunner.summary.answer import ADVICE
@@ -33,14 +31,13 @@ Keys of a study file, bundled scenes, variables, outcomes, figures and keywords 
 
 def reference() -> str:
     """The page, Markdown: all lists, each under a heading of the second level."""
-    wear = ASKED | COUNTS | LOOPS | OF_A_HISTORY | SCENE["exact"] | SCENE["natural_frequency"] | SCENE["mesh"]
+    of_scene = {**SCENE["exact"], **SCENE["natural_frequency"], **SCENE["mesh"], "stuck_frequency": STUCK_FREQUENCY}
     sections = {
         "Keys of a study file": key_list(),
         "Bundled scenes": "\n\n".join("#" + scene_help(model) for model in BUNDLED),
         "Keys of finite-element models": list_keys(Parameters),
-        "Variables of wear histories": _variables(wear | {"stuck_frequency": STUCK_FREQUENCY}),
-        "Variables of missions": _variables(OF_MISSIONS | OF_A_MISSION),
-        "Variables of nonlinear modes": _variables(OF_MODES | OF_A_MODE_POINT),
+        **{f"Variables of {kind.words}": _variables(kind.variables) for kind in KINDS.values()},
+        "Variables of the scene": _variables(of_scene),
         "Coordinates": _variables(COORDINATES),
         "Outcomes": _table(
             ("number", "outcome", "meaning", "what to do"),

@@ -13,9 +13,7 @@ import tests.benchmarks
 from solver.outcome import Outcome
 from studies.fe_models.deck.read import HARMLESS, KEYWORDS
 from studies.scenes import BUNDLED
-from studyrunner.kinds.missions.kind import OF_A_MISSION, OF_MISSIONS
-from studyrunner.kinds.modes.kind import OF_MODES
-from studyrunner.kinds.wear.kind import ASKED, OF_A_HISTORY
+from studyrunner.kinds.table import KINDS
 from studyrunner.report.contents import all_figures
 from studyrunner.study.sections import SECTIONS
 
@@ -109,5 +107,5 @@ def test_the_reference_names_all():
     assert text == runpy.run_path(str(page))["reference"](), "make it again: .venv/bin/python docs/reference.py"
     names = {f"{table}.{key}" for table in ("study", "solver", "slow_time") for key in SECTIONS[table].model_fields}
     names |= {str(outcome) for outcome in Outcome} | {figure.name for figure in all_figures()} | set(BUNDLED)
-    names |= {*ASKED, *OF_A_HISTORY, *OF_MODES, *OF_MISSIONS, *OF_A_MISSION, *KEYWORDS, *HARMLESS}
+    names |= {*KEYWORDS, *HARMLESS}.union(*(kind.variables for kind in KINDS.values()))
     assert [name for name in names if f"`{name}" not in text] == []

@@ -123,12 +123,12 @@ def as_history(dataset: xr.Dataset) -> tuple[xr.Dataset, xr.Dataset | None]:
         has_unit = np.char.endswith(dataset["response"].values.astype(str), "]")
         if has_unit.any() and not has_unit.all():
             history = history.isel(response=np.flatnonzero(~has_unit))
-    counted = kind_of(dataset).counted
+    kind = kind_of(dataset)
     if "block" in dataset.dims:
         names = map(str, history.variables)
-        renamed = history.rename({name: name.replace(counted, "cycle") for name in names if counted in name})
+        renamed = history.rename({name: name.replace(kind.counted, "cycle") for name in names if kind.counted in name})
         of_blocks = [name for name, variable in renamed.variables.items() if "block" in variable.dims]
-        history, blocks = renamed.drop_vars(of_blocks), renamed[of_blocks]
+        history, blocks = renamed.drop_vars(of_blocks).assign_attrs({KIND: kind.name}), renamed[of_blocks]
     if history is not dataset:
         # a dataset of another loses the file to be closed
         history.set_close(dataset.close)
