@@ -15,7 +15,7 @@ from studies.fe_models.deck.read import HARMLESS, KEYWORDS
 from studies.fe_models.from_files.parameters import Parameters
 from studies.scene import list_keys
 from studies.scenes import BUNDLED, scene_help
-from studyrunner.coordinates import COORDINATES, SCENE, STUCK_FREQUENCY
+from studyrunner.coordinates import COORDINATES, OF_SCENE, SCENE
 from studyrunner.kinds.table import KINDS
 from studyrunner.report.contents import all_figures
 from studyrunner.study.keys import key_list
@@ -31,7 +31,7 @@ Keys of a study file, bundled scenes, variables, outcomes, figures and keywords 
 
 def reference() -> str:
     """The page, Markdown: all lists, each under a heading of the second level."""
-    of_scene = {**SCENE["exact"], **SCENE["natural_frequency"], **SCENE["mesh"], "stuck_frequency": STUCK_FREQUENCY}
+    of_scene = {**SCENE["exact"], **{name: each for name, each in OF_SCENE.items() if name not in COORDINATES}}
     sections = {
         "Keys of a study file": key_list(),
         "Bundled scenes": "\n\n".join("#" + scene_help(model) for model in BUNDLED),

@@ -48,18 +48,6 @@ SCENE: dict[str, dict[str, Variable]] = {
 }
 """What `outputs.variables` asks of the scene under one name; the exact answers alone have the axes of the study."""
 
-STUCK_FREQUENCY = Variable(
-    (),
-    "Hz",
-    "first natural frequency with the joint stuck, without damping",
-    "At the nodal diameter of the excitation; NaN where nothing moves that has mass.",
-    content=_REFERENCE,
-)
-"""Of the scene; along the axes along which the scenes of a study differ."""
-
-WORN_DEPTH = Variable(("contact",), "m", "wear depth at the start", "Key scene.worn; wear_depth counts from there.")
-"""Of a joint that is mounted worn."""
-
 COORDINATES = {
     "frequency": Variable((), "Hz", "excitation frequency", "Of a followed resonance the middle of loading.between."),
     "frequency_ratio": Variable(
@@ -118,3 +106,21 @@ COORDINATES = {
     ),
 }
 """Coordinates, the axes first."""
+
+OF_SCENE = {
+    **SCENE["mesh"],
+    **SCENE["natural_frequency"],
+    "stuck_frequency": Variable(
+        (),
+        "Hz",
+        "first natural frequency with the joint stuck, without damping",
+        "At the nodal diameter of the excitation; NaN where nothing moves that has mass.",
+        content=_REFERENCE,
+    ),
+    "worn_depth": Variable(
+        ("contact",), "m", "wear depth at the start", "Key scene.worn; wear_depth counts from there."
+    ),
+    **{name: entry for name, entry in COORDINATES.items() if entry.dimensions},
+}
+"""Arrays of the scene, with the axes along which they differ before these dimensions. What tasks compute, and the exact
+answers, have all axes."""

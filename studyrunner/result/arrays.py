@@ -6,13 +6,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.outcome import Outcome
-from studyrunner.coordinates import COORDINATES, POINT, SAMPLE, STUCK_FREQUENCY, WORN_DEPTH
-from studyrunner.kinds.wear.kind import ASKED, LOOP_COMPONENTS, LOOP_PHASES
+from studyrunner.coordinates import COORDINATES, OF_SCENE, POINT, SAMPLE
+from studyrunner.kinds.wear.kind import ASKED
 from studyrunner.points.draw import block_of_input
 from studyrunner.points.table import Column, Points
 from studyrunner.scene import scene_set
 from studyrunner.scene.answers import SmallArray
-from studyrunner.scene.scene import SceneFacts
+from studyrunner.scene.scene import SceneFacts, dimensions_behind
 from studyrunner.study.scene_axes import describe_key
 from studyrunner.study.sections import SOLVER_AXES
 from studyrunner.study.study import Study
@@ -51,25 +51,22 @@ def small_arrays(
     return [
         *(SmallArray("frequency", *each, COORDINATES["frequency"]) for each in hertz),
         *coordinates(study, facts, scenes),
-        SmallArray(
-            "stuck_frequency", *scenes.along_axes([np.array(each.stuck_frequency) for each in facts]), STUCK_FREQUENCY
-        ),
+        _of_scene("stuck_frequency", *scenes.along_axes([np.array(each.stuck_frequency) for each in facts])),
         *_worn_coordinate(study, facts, points),
         *sample_coordinates(study, facts, scenes),
         *of_scene,
     ]
 
 
+def _of_scene(name: str, along: Sequence[str], values: NDArray[np.generic]) -> SmallArray:
+    return SmallArray(name, (*along, *OF_SCENE[name].dimensions), values, OF_SCENE[name])
+
+
 def coordinates(study: Study, of_scenes: Sequence[SceneFacts], scenes: scene_set.SceneSet) -> Iterator[SmallArray]:
     """Coordinates of the file but those of samples and worn joints. of_scenes: facts of each."""
     facts = scene_set.merge_facts(of_scenes)
     along: dict[str, Sequence[object] | NDArray[np.generic]] = dict(study.dimensions)
-    counted = np.array(study.output_counts, dtype=int if study.kind.whole else float)
-    along.setdefault(study.kind.counted or "cycle", counted)
-    along |= study.kind.dimensions(study)
-    along |= {"contact": range(facts.contact.n_contact), "response": facts.response_names}
-    if study.outputs.loops:
-        along |= {"phase": 2.0 * np.pi * np.arange(LOOP_PHASES) / LOOP_PHASES, "component": LOOP_COMPONENTS}
+    along |= dimensions_behind(study, facts)
     dims = {name: name for name in along}
     if study.design is not None:
         tables = {axis.name: axis.values for axis in study.scene_axes}
@@ -84,7 +81,7 @@ def coordinates(study: Study, of_scenes: Sequence[SceneFacts], scenes: scene_set
         yield SmallArray(name, (dims[name],), labels, _coordinate_entry(study, name))
     yield from _of_pairs(of_scenes, scenes)
     if facts.edge is not None:
-        yield SmallArray("contact_edge", ("contact",), facts.edge.astype(np.int8), COORDINATES["contact_edge"])
+        yield _of_scene("contact_edge", (), facts.edge.astype(np.int8))
 
 
 def _of_pairs(facts: Sequence[SceneFacts], scenes: scene_set.SceneSet) -> Iterator[SmallArray]:
@@ -102,7 +99,7 @@ def _of_pairs(facts: Sequence[SceneFacts], scenes: scene_set.SceneSet) -> Iterat
     found |= {"contact_area": area, "contact_surface": surface}
     found |= {"contact_exists": np.isfinite(area).astype(np.int8)} if names else {}
     for name, values in found.items():
-        yield SmallArray(name, (*names, "contact"), np.array(values[numbers]), COORDINATES[name])
+        yield _of_scene(name, names, np.array(values[numbers]))
 
 
 def _coordinate_entry(study: Study, name: str) -> Variable:
@@ -120,7 +117,7 @@ def _worn_coordinate(study: Study, facts: Sequence[SceneFacts], points: Points) 
     if study.scene.worn is not None and len(facts) == 1:
         axes = [axis.name for axis in study.scene_axes if axis.key == ("worn",)]
         names, values = points.along([scene_set.worn_depth(each, facts[0]) for each in points.studies], keep=axes)
-        yield SmallArray("worn_depth", (*names, "contact"), values, WORN_DEPTH)
+        yield _of_scene("worn_depth", names, values)
 
 
 def sample_coordinates(study: Study, facts: Sequence[SceneFacts], scenes: scene_set.SceneSet) -> Iterator[SmallArray]:

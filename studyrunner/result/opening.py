@@ -17,7 +17,7 @@ import numpy as np
 import xarray as xr
 
 from solver.outcome import Outcome
-from studyrunner.coordinates import COORDINATES, POINT, SAMPLE, SCENE, STUCK_FREQUENCY, WORN_DEPTH
+from studyrunner.coordinates import COORDINATES, OF_SCENE, POINT, SAMPLE, SCENE
 from studyrunner.kinds.kind import Kind
 from studyrunner.kinds.table import kind_of_file
 from studyrunner.kinds.wear.kind import CERTIFICATE, LOOPS
@@ -45,9 +45,6 @@ _LONG = ("study", "flag_meanings")
 _OF_VARIABLES = ("units", "long_name", "flag_meanings", "flag_values")  # attributes for the report
 _REMEDY = "give a result file of run-study that is whole"
 
-_OF_SCENE = SCENE["mesh"] | SCENE["natural_frequency"]
-_OF_SCENE |= {"stuck_frequency": STUCK_FREQUENCY, "worn_depth": WORN_DEPTH}
-_OF_SCENE |= {name: entry for name, entry in COORDINATES.items() if entry.dimensions}
 _WORDS = ("scheme", "sweep")
 _TEXTS = (*_WORDS, "response", "component", "block")
 _DRAWN_VALUES = Variable((), "1", "what the samples draw of an input")
@@ -240,8 +237,8 @@ def _known_variables(dataset: xr.Dataset) -> dict[str, tuple[tuple[str, ...], Va
             _need(is_along, name, f"dimensions {', '.join(map(str, variable.dims))}")
         elif name in with_axes:
             known[name] = (*axes, *with_axes[name].dimensions), with_axes[name]
-        elif name in _OF_SCENE:
-            known[name] = (*along, *_OF_SCENE[name].dimensions), _OF_SCENE[name]
+        elif name in OF_SCENE:
+            known[name] = (*along, *OF_SCENE[name].dimensions), OF_SCENE[name]
         elif variable.dims == (POINT,):
             known[name] = (POINT,), None
     return known

@@ -25,7 +25,7 @@ from studyrunner.kinds.wear.kind import LOOPS
 from studyrunner.result.arrays import attributes
 from studyrunner.result.target import Target
 from studyrunner.scene.answers import SmallArray, StoredScene
-from studyrunner.scene.scene import SceneFacts, variable_sizes
+from studyrunner.scene.scene import SceneFacts, dimensions_behind
 from studyrunner.study.study import Study
 from studyrunner.study.text import POINTS_LEFT, SCENE_GROUP
 from studyrunner.system.machine import find_fault, replacing
@@ -139,7 +139,8 @@ def _slabs(
 def _create_all(
     file: netCDF4.Dataset, study: Study, facts: SceneFacts, slab: Sequence[int], arrays: Sequence[SmallArray]
 ) -> dict[str, Variable]:
-    sizes = {name: len(values) for name, values in study.dimensions.items()} | variable_sizes(study, facts)
+    both = {**study.dimensions, **dimensions_behind(study, facts)}
+    sizes = {name: len(values) for name, values in both.items()}
     variables = {**study.recorded, **study.kind.always}
     for name, size in sizes.items():
         file.createDimension(name, size)

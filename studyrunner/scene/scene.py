@@ -4,7 +4,7 @@ import contextlib
 import hashlib
 import json
 import math
-from collections.abc import Hashable, Iterator
+from collections.abc import Hashable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -154,17 +154,20 @@ def _wrong_beside(study: Study, model: ReducedModel) -> Iterator[Wrong]:
         yield Wrong(key, value, f"give fewer, or fewer slow_time.outputs: one point would take {1e-9 * size:.1f} GB")
 
 
-def variable_sizes(study: Study, facts: SceneFacts) -> dict[str, int]:
-    """Lengths of the dimensions after the axes."""
-    counted = {study.kind.counted: len(study.output_counts)} if study.kind.counted else {}
-    own = {name: len(values) for name, values in study.kind.dimensions(study).items()}
-    loops = {"phase": LOOP_PHASES, "component": len(LOOP_COMPONENTS)} if study.outputs.loops else {}
-    return {**counted, **own, "contact": facts.contact.n_contact, "response": len(facts.response_names), **loops}
+def dimensions_behind(study: Study, facts: SceneFacts) -> dict[str, Sequence[object] | NDArray[np.generic]]:
+    """The dimensions after the axes, with their values."""
+    kind, found = study.kind, dict[str, Sequence[object] | NDArray[np.generic]]()
+    if kind.counted:
+        found[kind.counted] = np.array(study.output_counts, dtype=int if kind.whole else float)
+    found |= {**kind.dimensions(study), "contact": range(facts.contact.n_contact), "response": facts.response_names}
+    if study.outputs.loops:
+        found |= {"phase": 2.0 * np.pi * np.arange(LOOP_PHASES) / LOOP_PHASES, "component": LOOP_COMPONENTS}
+    return found
 
 
 def record_fields(study: Study, facts: SceneFacts) -> list[tuple[str, str, tuple[int, ...]]]:
     """Name, data type and shape of each value of a result."""
-    sizes, fields = variable_sizes(study, facts), []
+    sizes, fields = {name: len(values) for name, values in dimensions_behind(study, facts).items()}, []
     for name, entry in {**study.kind.always, **study.recorded}.items():
         # of all pairs, only those asked for have a loop
         lengths = {**sizes, "contact": len(study.outputs.loops)} if name in LOOPS else sizes

@@ -24,7 +24,7 @@ from studyrunner.result.arrays import attributes, coordinates
 from studyrunner.result.provenance import describe_run
 from studyrunner.result.view import Result, open_for_report
 from studyrunner.scatter import ScatterSection, draw
-from studyrunner.scene.scene import SceneFacts, variable_sizes
+from studyrunner.scene.scene import SceneFacts, dimensions_behind
 from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.study import Study
 from studyrunner.study.text import POINTS_LEFT
@@ -298,8 +298,8 @@ def result_of_study(
 
 def build_dataset(study: Study, facts: SceneFacts, results: Sequence[PointResult]) -> xr.Dataset:
     """The result of a study: axes in the order of the study, then cycle, then contact or response."""
-    axes, sizes = study.dimensions, variable_sizes(study, facts)
-    sizes = {name: len(values) for name, values in axes.items()} | sizes
+    axes, behind = study.dimensions, dimensions_behind(study, facts)
+    sizes = {name: len(values) for name, values in {**axes, **behind}.items()}
     variables = {**study.recorded, **study.kind.always}
     dataset = _empty(axes, sizes, variables)
     dataset["outcome"].values[...] = Outcome.CONVERGED
