@@ -60,7 +60,8 @@ def effort_of(study: Study, works: Iterable[Work]) -> Effort:
         n_of[work.way] += work.n_tasks
         n_results[work.way] += work.n_results
         longest = max(longest, work.longest)
-    words = ", and ".join(study.kind.part("tasks").effort_words(n_of, n_results))
+    ways: Mapping[str, Callable[[int, int], str]] = study.kind.part("tasks").WAYS
+    words = ", and ".join(text(n_of[way], n_results[way]) for way, text in ways.items() if n_of[way])
     return Effort(words, n_tasks, n_unknowns, seconds, longest)
 
 

@@ -17,7 +17,7 @@ from tests.studyrunner.small_studies import MISSIONS, MODES, SLIDER
 STUDIES = {"wear": SLIDER, "modes": MODES, "missions": MISSIONS}
 PARTS = {
     "rules": ("broken_rules",),
-    "tasks": ("build_tasks", "effort_words", "plan_rows"),
+    "tasks": ("build_tasks", "WAYS", "plan_rows"),
     "findings": ("what_came_out", "errors_of"),
     "figures": ("FIGURES",),
 }

@@ -62,13 +62,6 @@ OF_MISSIONS = {
     "worn_volume_error": _by_mission("worn_volume_error"),
     "wear_depth_error": _by_mission("wear_depth_error"),
 }
-"""Those that `outputs.variables` asks for in a study of missions, in the order of the file."""
-
-OF_MISSIONS_BY_DEFAULT = tuple(name for name in OF_MISSIONS if name not in OF_SAMPLES_ALONE)
-"""Those of a study of missions that names none."""
-
-OF_SAMPLED_MISSIONS = tuple(name for name in OF_MISSIONS if name not in ("wear_depth", "wear_depth_error"))
-"""Those of a study of missions with [scatter] that names none."""
 
 OF_A_MISSION = {
     "outcome": OF_A_HISTORY["outcome"],
@@ -81,7 +74,6 @@ OF_A_MISSION = {
     "largest_wear_depth": OF_A_HISTORY["largest_wear_depth"],
     "message": OF_A_HISTORY["message"],
 }
-"""Those that every result of missions holds."""
 
 MISSIONS = Kind(
     name="missions",
@@ -96,8 +88,8 @@ MISSIONS = Kind(
     why="leave it out: slow_time.missions counts in place of cycles, and missions choose their own steps",
     asked=OF_MISSIONS,
     always=OF_A_MISSION,
-    usual=OF_MISSIONS_BY_DEFAULT,
-    of_samples=OF_SAMPLED_MISSIONS,
+    usual=tuple(name for name in OF_MISSIONS if name not in OF_SAMPLES_ALONE),
+    of_samples=tuple(name for name in OF_MISSIONS if name not in ("wear_depth", "wear_depth_error")),
     counted="mission",
     whole=True,
     dimensions=lambda study: {"block": [block.name for block in study.mission]},

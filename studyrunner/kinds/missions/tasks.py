@@ -183,10 +183,9 @@ def _values(task: Mission, history: "MissionHistory") -> dict[str, Any]:
     return named((*task.variables, *OF_A_MISSION), own, history)
 
 
-def effort_words(n_of: Mapping[str, int], n_results: Mapping[str, int]) -> Iterator[str]:
-    """What is computed, in words, from the numbers of tasks and of results by what they do."""
-    if n_results["mission"]:
-        yield f"{count(n_of['mission'], 'mission history', 'mission histories')}, each computed by one rank"
+WAYS = {
+    "mission": lambda n_tasks, _: f"{count(n_tasks, 'mission history', 'mission histories')}, each computed by one rank"
+}
 
 
 def plan_rows(study: Study) -> Iterator[tuple[str, str]]:

@@ -28,7 +28,6 @@ OF_MODES = {
     "harmonics_used": replace(ASKED["harmonics_used"], dimensions=()),
     "samples_used": replace(ASKED["samples_used"], dimensions=()),
 }
-"""Those that `outputs.variables` asks for in a study of nonlinear modes, in the order of the file."""
 
 OF_A_MODE_POINT = {
     "outcome": OF_A_HISTORY["outcome"],
@@ -40,7 +39,6 @@ OF_A_MODE_POINT = {
     ),
     "message": OF_A_HISTORY["message"],
 }
-"""Those that every result of nonlinear modes holds."""
 
 _SWEEP = "up: the modal amplitude is raised from zero; down: raised to a larger one, then lowered."
 MODES = Kind(
@@ -56,7 +54,7 @@ MODES = Kind(
     why="leave it out: with axes.modal_amplitude nothing is excited and nothing wears",
     asked=OF_MODES,
     always=OF_A_MODE_POINT,
-    usual=tuple(OF_MODES),
-    of_samples=tuple(OF_MODES),
+    usual=(*OF_MODES,),
+    of_samples=(*OF_MODES,),
     coordinates={"sweep": Variable((), "1", "how the amplitude is reached", _SWEEP)},
 )

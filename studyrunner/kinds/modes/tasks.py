@@ -88,10 +88,11 @@ def build_tasks(study: Study, points: Points, n_displacements: Sequence[int]) ->
     return tasks.number_points(found, points.n)
 
 
-def effort_words(n_of: Mapping[str, int], n_results: Mapping[str, int]) -> Iterator[str]:
-    """What is computed, in words, from the numbers of tasks and of results by what they do."""
-    if n_of["mode"]:
-        yield f"{count(n_of['mode'], 'nonlinear mode')} over the amplitude, {count(n_results['mode'], 'point')}"
+WAYS = {
+    "mode": lambda n_tasks, n_results: (
+        f"{count(n_tasks, 'nonlinear mode')} over the amplitude, {count(n_results, 'point')}"
+    )
+}
 
 
 def plan_rows(study: Study) -> tuple[tuple[str, str], ...]:  # noqa: ARG001

@@ -235,13 +235,11 @@ def _together(study: Study, shared: Sequence[_Shared]) -> Iterator[_Together]:
             yield _Together(integrated, tuple(itertools.chain.from_iterable(points)), iterations)
 
 
-def effort_words(n_of: Mapping[str, int], n_results: Mapping[str, int]) -> Iterator[str]:
-    """What is computed, in words, from the numbers of tasks and of results by what they do."""
-    if n_starts := n_results["sweep"] + n_results["ramp"]:
-        by = " and ".join(count(n_of[way], way) for way in ("sweep", "ramp") if n_of[way])
-        yield f"{count(n_starts, 'start state')} by {by}"
-    if n_results["history"]:
-        yield count(n_results["history"], "wear history", "wear histories")
+WAYS = {
+    "sweep": lambda n_tasks, n_results: f"{count(n_results, 'start state')} by {count(n_tasks, 'sweep')}",
+    "ramp": lambda n_tasks, n_results: f"{count(n_results, 'start state')} by {count(n_tasks, 'ramp')}",
+    "history": lambda _, n_results: count(n_results, "wear history", "wear histories"),
+}
 
 
 def plan_rows(study: Study) -> Iterator[tuple[str, str]]:
