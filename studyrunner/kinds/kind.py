@@ -76,9 +76,9 @@ class Kind:
     def part(self, name: str) -> Any:
         """A file of its folder, loaded where it is used: studies are read without tasks, and results without studies.
 
-        - "rules": `broken_rules(study)`, of a kind with a table its class `TABLE` and `read_table`;
-        - "tasks": `build_tasks(study, points, n_displacements)`, `plan_rows(study)`, and `WAYS`, what so many tasks with so
-          many results do, in words;
+        - "rules": `broken_rules(study)`, of a kind with a table `TABLE`, its class, `read_table` and `complete`;
+        - "tasks": `build_tasks(study, points, n_displacements)`, `plan_rows(study)`, and `WAYS`, what n tasks with m
+          results do, in words;
         - "findings": `what_came_out(result, stuck)`, `errors_of(result, wore)`;
         - "figures": `FIGURES`, in the order of the page.
         """

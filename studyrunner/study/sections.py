@@ -12,6 +12,9 @@ from studies.scene import Unit
 from studyrunner.scatter import ScatterSection
 from studyrunner.values import Axis, Fraction, Listed, NotNegative, Positive, Section, Whole, Wrong, ascending, once
 
+IDLE_FREQUENCY = 1.0
+"""Hz, where no point has a frequency of the axis."""
+
 AUTO: Final = "auto"
 """In place of a number of harmonics or samples: as many as each state needs for `rtol`."""
 
@@ -179,9 +182,6 @@ class SlowTimeSection(Section):
         """The outputs lie on the way to the end."""
         missions, cycles, outputs = self.missions, self.cycles, self.outputs
         counts = outputs if isinstance(outputs, tuple) else ()
-        if missions is not None and self.until is not None and "frequency_shift" in self.until:
-            remedy = "give wear_depth or worn_volume: blocks of a mission have frequencies of their own"
-            yield Wrong("until", self.until, remedy)
         if counts and missions is None and cycles == math.inf:
             remedy = "give their number: with slow_time.cycles = inf they are spaced evenly in worn volume and cycles"
             yield Wrong("outputs", outputs, remedy)

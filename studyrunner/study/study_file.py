@@ -28,7 +28,6 @@ from studyrunner.study.text import format_toml, read_archived, read_toml
 from studyrunner.user_error import UserError, Verbatim
 from studyrunner.values import listed
 
-_IDLE_FREQUENCY = 1.0  # Hz, where no point has a frequency of the axis
 _ON_REQUEST = ("scatter", "loading")
 
 
@@ -168,35 +167,13 @@ def _check_study(table: Mapping[str, object], origin: Origin, design: Design | N
                 study = Study.model_construct(**{**given_tables, **fixed, **own})
                 raise_wrong(source, broken_rules(study, first=not studies))
                 study = study.model_copy(update={"scene_axes": (), "design": None})
-                studies.append(_complete(_with_block_studies(study, given["scene"], origin)))
+                if kind.table:
+                    study = kind.part("rules").complete(study, given["scene"], origin)
+                studies.append(_complete(study))
     study = studies[0]
     if (found := (*scene_axes.as_checked(axes, study), *worn_axis)) or design is not None:
         study = study.model_copy(update={"scene_axes": found, "variants": tuple(studies), "design": design})
     return study
-
-
-def _with_block_studies(study: Study, given: Mapping[str, Any], origin: Origin) -> Study:
-    """The study with a study of each block alone. given: keys of [scene] in the study file."""
-    studies, source, scene = [], study.source, study.scene
-    for block in study.mission:
-        with keys_as_given({f"scene.{key}": f"mission.{block.name}.{key}" for key in block.parameters}):
-            table = {"scene": {**given, **block.parameters}}
-            parameters = check_tables({"scene": type(scene.parameters)}, table, source)["scene"]
-            of_block = find_scene(
-                SceneSection(model=scene.model, parameters=parameters, worn=scene.worn), origin, scene
-            )
-        values = {name: getattr(block, name, None) for name in study.kind.numbers}
-        own = {name: (value,) for name, value in values.items() if isinstance(value, float)}
-        if block.engine_order is not None:
-            speed, key = dict(parameters).get("rotation_speed"), f"mission.{block.name}.engine_order"
-            if not isinstance(speed, int | float) or speed <= 0.0:
-                remedy = "give scene.rotation_speed above 0, rpm, which the order multiplies, or a frequency"
-                raise UserError(source, key, block.engine_order, remedy)
-            own["frequency"] = (block.engine_order * float(speed) / 60.0,)
-        axes = study.axes.model_copy(update={"frequency": study.axes.frequency or (_IDLE_FREQUENCY,), **own})
-        update = {"slow_time": sections.SlowTimeSection(), "scene": of_block, "axes": axes}
-        studies.append(study.model_copy(update={"kind": KINDS["wear"], "tables": {}, **update}))
-    return study.model_copy(update={"block_studies": tuple(studies)})
 
 
 def _complete(study: Study) -> Study:
@@ -205,7 +182,7 @@ def _complete(study: Study) -> Study:
     Ratios stand for frequencies until the natural frequencies of the scenes are known (`scene_set.at_ratios`).
     """
     axes, kind, names = study.axes, study.kind, set(study.outputs.variables)
-    frequency = axes.frequency_ratio or axes.frequency or (_IDLE_FREQUENCY,)
+    frequency = axes.frequency_ratio or axes.frequency or (sections.IDLE_FREQUENCY,)
     update: dict[str, object] = {}
     if study.loading is not None:
         low, high = study.loading.between

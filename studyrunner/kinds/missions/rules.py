@@ -1,13 +1,15 @@
 """[[mission]]: the blocks of a mission, and what they ask of the other tables."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 
 from solver.settings import Passage
-from studyrunner.study.mistakes import check_tables, nearest_name, raise_wrong
-from studyrunner.study.sections import AxesSection
+from studyrunner.kinds.wear.kind import WEAR
+from studyrunner.study.mistakes import check_tables, keys_as_given, nearest_name, raise_wrong
+from studyrunner.study.scene_section import Origin, SceneSection, find_scene
+from studyrunner.study.sections import IDLE_FREQUENCY, AxesSection, SlowTimeSection
 from studyrunner.study.study import Study
 from studyrunner.user_error import UserError
 from studyrunner.values import Positive, Section, Wrong
@@ -132,6 +134,9 @@ def broken_rules(study: Study) -> Iterator[Wrong]:
     blocks, axes = study.mission, study.axes
     if study.slow_time.missions is None:
         yield Wrong("slow_time.missions", None, "missing: give how often the blocks under [[mission]] are repeated")
+    if "frequency_shift" in (study.slow_time.until or {}):
+        remedy = "give wear_depth or worn_volume: blocks of a mission have frequencies of their own"
+        yield Wrong("slow_time.until", study.slow_time.until, remedy)
     for before, block in zip((*blocks[-1:], *blocks), blocks, strict=False):
         key, (theirs, ours) = f"mission.{block.name}", (before.parameters, block.parameters)
         changed = any(theirs.get(name) != ours.get(name) for name in {**theirs, **ours})
@@ -143,5 +148,28 @@ def broken_rules(study: Study) -> Iterator[Wrong]:
             yield Wrong(f"{key}.begin", block.begin, remedy)
     for name in (*_OWN_AXES, *(axis.name for axis in study.scene_axes)):
         given = name not in _OWN_AXES or name in axes.model_fields_set
-        if blocks and given and all(block.gives(name) for block in blocks):
+        if given and all(block.gives(name) for block in blocks):
             yield Wrong(f"axes.{name}", None, f"leave it out: every block under [[mission]] gives its own {name}")
+
+
+def complete(study: Study, given: Mapping[str, Any], origin: Origin) -> Study:
+    """The study with a study of each block alone. given: keys of [scene] in the study file."""
+    studies, source, scene = [], study.source, study.scene
+    for block in study.mission:
+        with keys_as_given({f"scene.{key}": f"mission.{block.name}.{key}" for key in block.parameters}):
+            table = {"scene": {**given, **block.parameters}}
+            parameters = check_tables({"scene": type(scene.parameters)}, table, source)["scene"]
+            of_block = find_scene(
+                SceneSection(model=scene.model, parameters=parameters, worn=scene.worn), origin, scene
+            )
+        own = {name: (getattr(block, name),) for name in _OWN_AXES if isinstance(getattr(block, name), float)}
+        if block.engine_order is not None:
+            speed, key = dict(parameters).get("rotation_speed"), f"mission.{block.name}.engine_order"
+            if not isinstance(speed, int | float) or speed <= 0.0:
+                remedy = "give scene.rotation_speed above 0, rpm, which the order multiplies, or a frequency"
+                raise UserError(source, key, block.engine_order, remedy)
+            own["frequency"] = (block.engine_order * float(speed) / 60.0,)
+        axes = study.axes.model_copy(update={"frequency": study.axes.frequency or (IDLE_FREQUENCY,), **own})
+        alone = {"kind": WEAR, "tables": {}, "slow_time": SlowTimeSection(), "scene": of_block, "axes": axes}
+        studies.append(study.model_copy(update=alone))
+    return study.model_copy(update={"block_studies": tuple(studies)})
