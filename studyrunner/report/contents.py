@@ -67,7 +67,9 @@ ONE: dict[str, Any] = {"scene": OF_PAIRS, "at": "point"}
 """Options of a figure of the pairs at the shown point."""
 
 _OTHERS = "Each value of the horizontal axis is a separate joint, which has worn at this value alone"
-_MAP, _WORN = f"{_OTHERS}. Hatched: no result", ("worn_volume",)
+_WORN, _BOTH = ("worn_volume",), "Of both surfaces together"
+_MAP: dict[str, Any] = {"needs": _WORN, "caption": f"{_OTHERS}. Hatched: no result"}
+_RATE: dict[str, Any] = {"needs": (*_WORN, "wear_rate")}
 _QUANTILES = (
     "Line: half of the samples wear less. Bands: from 5 to 95 % and from 25 to 75 % of the samples, widened by the"
     " numerical errors"
@@ -96,13 +98,8 @@ OF_WEAR = (
     Entry("deciding_inputs", "What decides the worn volume", points.draw_deciding_inputs, caption=_DECIDING),
     Entry("worn_volume", "Worn volume over {slow}", wear.draw_history, needs=_WORN, at="course", caption=BANDS),
     Entry("final_worn_volume", "Final worn volume over {over}", wear.draw_final, needs=_WORN, caption=_ENDS),
-    *(
-        Entry(f"{name}_map", f"{of} over {{over}} and {{slow}}", wear.draw_map, name, needs=needs, caption=_MAP)
-        for name, of, needs in (
-            ("worn_volume", "Worn volume", _WORN),
-            ("wear_rate", "Wear rate", (*_WORN, "wear_rate")),
-        )
-    ),
+    Entry("worn_volume_map", "Worn volume over {over} and {slow}", wear.draw_map, "worn_volume", **_MAP),
+    Entry("wear_rate_map", "Wear rate over {over} and {slow}", wear.draw_map, "wear_rate", **_MAP | _RATE),
 )
 """Of results with a slow time: what wears."""
 
@@ -110,13 +107,8 @@ OF_POINTS = (
     Entry("trends", "Trends along the axes of the study", points.draw_trends, caption="Bars: estimated errors"),
     Entry("points", "Points of the design (table)", points.list_points, always=True),
     Entry("worn_root", "The worn root", root.draw_root, **ONE),
-    *(
-        Entry(name, title, draw, caption="Of both surfaces together", **ONE)
-        for name, title, draw in (
-            ("wear_depth", "Wear depth of each pair", pairs.draw_depths),
-            ("worn_profile", "Worn profile of the contact surfaces", pairs.draw_profile),
-        )
-    ),
+    Entry("wear_depth", "Wear depth of each pair", pairs.draw_depths, caption=_BOTH, **ONE),
+    Entry("worn_profile", "Worn profile of the contact surfaces", pairs.draw_profile, caption=_BOTH, **ONE),
 )
 """Of results with a slow time: points and pairs."""
 

@@ -1,7 +1,7 @@
 """Rules between the tables of a study, which are right themselves. Each yields what breaks it."""
 
 from collections.abc import Iterator
-from typing import Any, get_args
+from typing import Any, cast, get_args
 
 from solver.settings import FIRST_HARMONICS
 from studyrunner.kinds.table import KINDS
@@ -37,7 +37,8 @@ def _keys(study: Study) -> Iterator[Wrong]:
 
 def _frequency(study: Study) -> Iterator[Wrong]:
     """The frequency is given once: in Hz, as a ratio, or as a resonance in a range."""
-    axes, word, frequency = study.axes, _followed(study), list(study.axes.frequency or ())
+    axes, frequency = study.axes, [*cast("tuple[Any, ...]", study.axes.frequency or ())]
+    word = next((each for each in frequency if isinstance(each, str)), None)
     given = axes.model_fields_set & {"frequency", "frequency_ratio"}
     if len(given) > 1:
         yield Wrong("axes.frequency", frequency, "give either it, in Hz, or frequency_ratio")
@@ -48,11 +49,6 @@ def _frequency(study: Study) -> Iterator[Wrong]:
     if word is not None and (is_fixed or len(frequency) > 1):
         remedy = f'give Hz: "{word}" stands alone, and goes with no mission, no sweep "ramp" and no scheme "final"'
         yield Wrong("axes.frequency", frequency, remedy)
-
-
-def _followed(study: Study) -> str | None:
-    given: tuple[Any, ...] = study.axes.frequency or ()
-    return next((each for each in given if isinstance(each, str)), None)
 
 
 def _outputs(study: Study) -> Iterator[Wrong]:

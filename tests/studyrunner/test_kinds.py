@@ -15,12 +15,8 @@ from tests.studyrunner.results import as_result, result_of_study
 from tests.studyrunner.small_studies import MISSIONS, MODES, SLIDER
 
 STUDIES = {"wear": SLIDER, "modes": MODES, "missions": MISSIONS}
-PARTS = {
-    "rules": ("broken_rules",),
-    "tasks": ("build_tasks", "WAYS", "plan_rows"),
-    "findings": ("what_came_out", "errors_of"),
-    "figures": ("FIGURES",),
-}
+PARTS = {"rules": ("broken_rules",), "tasks": ("build_tasks", "WAYS", "plan_rows"), "figures": ("FIGURES",)}
+PARTS |= {"findings": ("what_came_out", "errors_of")}
 
 
 def study_of(name, folder, overrides=()):
@@ -55,18 +51,12 @@ def test_each_axis_is_read_by_a_kind_and_refused_by_the_others(tmp_path):
 
 
 def test_two_markers_are_refused_in_one_sentence(tmp_path):
-    marked = [(kind, read_marker(kind)) for kind in KINDS.values() if kind.marker]
-    for (one, _), (other, given) in permutations(marked, 2):
+    for one, other in permutations([kind for kind in KINDS.values() if kind.marker], 2):
+        given = {other.marker.strip("[]"): [] if other.table else 1e-3}
         with pytest.raises(UserError) as refused:
             study_of(one.name, tmp_path, given)
         assert len(refused.value.mistakes) == 1
-        assert all(each.marker in str(refused.value) for each in (one, other))
-        assert "s.toml" in str(refused.value)
-
-
-def read_marker(kind):
-    """Overrides with what marks a kind."""
-    return {kind.marker.strip("[]"): [] if kind.table else 1e-3}
+        assert all(words in str(refused.value) for words in ("s.toml", one.marker, other.marker))
 
 
 @pytest.mark.parametrize("name", KINDS)

@@ -71,17 +71,13 @@ _CYCLES = (
     " zeta: damping ratio of the joint at rest"
 )
 _WEAR = f"Above, shares of the blocks in the volume worn in one mission. {BANDS}"
+_TITLE = "Vibration of each block over the missions"
 _VIBRATION = f"Amplitude of the first harmonic in the mission that ends at the number. {BANDS}"
 
 FIGURES = (
     Entry("blocks", "Blocks of the mission with their wear", list_blocks, needs=_LISTED, at="point", caption=_CYCLES),
-    *(
-        Entry(name, f"{of} over the missions", draw_blocks, shown, at="point", caption=caption)
-        for name, of, shown, caption in (
-            ("block_shares", "Wear by block", _SHARES, _WEAR),
-            ("block_responses", "Vibration of each block", _RESPONSES, _VIBRATION),
-        )
-    ),
+    Entry("block_shares", "Wear by block over the missions", draw_blocks, _SHARES, at="point", caption=_WEAR),
+    Entry("block_responses", _TITLE, draw_blocks, _RESPONSES, at="point", caption=_VIBRATION),
     *OF_WEAR,
     *OF_POINTS,
     *AT_THE_END,

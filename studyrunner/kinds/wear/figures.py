@@ -1,11 +1,11 @@
 """Figures of wear histories."""
 
-from typing import Any
-
 from studyrunner.report.contents import AT_THE_END, BANDS, OF_POINTS, OF_WEAR, ONE, Entry
-from studyrunner.report.figures import pairs, precision, response, wear
+from studyrunner.report.figures import pairs, precision, wear
+from studyrunner.report.figures.response import draw_loops, draw_responses
 
-_RESPONSE: dict[str, Any] = {"needs": ("response_amplitude",)}
+_NEEDED = ("response_amplitude",)
+_OPEN = "Where the force is zero the pair is open"
 _LOOPS = (
     "Tangential force over relative displacement through a period, each about its mean: the area inside is the energy"
     " of friction"
@@ -18,18 +18,13 @@ _PRECISION = (
 
 FIGURES = (
     *OF_WEAR,
-    Entry("frequency_response", "Frequency response of one joint, new and worn", response.draw_responses, **_RESPONSE),
+    Entry("frequency_response", "Frequency response of one joint, new and worn", draw_responses, needs=_NEEDED),
     Entry("excitation_frequency", "Frequency of the followed resonance", wear.draw_excitation, caption=BANDS),
     *OF_POINTS,
     Entry("mean_pressure", "Mean pressure", pairs.draw_pressure, needs=("mean_pressure",), **ONE),
-    *(
-        Entry(name, title, response.draw_loops, name, caption=caption, **ONE)
-        for name, title, caption in (
-            ("fretting_loops", "Fretting loops", _LOOPS),
-            ("normal_load", "Normal force through a period", "Where the force is zero the pair is open"),
-            ("pair_motion", "Motion of the pairs in the contact plane", _MOTION),
-        )
-    ),
+    Entry("fretting_loops", "Fretting loops", draw_loops, "fretting_loops", caption=_LOOPS, **ONE),
+    Entry("normal_load", "Normal force through a period", draw_loops, "normal_load", caption=_OPEN, **ONE),
+    Entry("pair_motion", "Motion of the pairs in the contact plane", draw_loops, "pair_motion", caption=_MOTION, **ONE),
     *AT_THE_END,
     Entry("precision", "Error against run time", precision.draw_precision, caption=_PRECISION),
 )
