@@ -14,7 +14,7 @@ from solver.model import ReducedModel
 from solver.packing import Packed
 from solver.settings import Direction, Passage, WearTarget
 from studyrunner.kinds import task as tasks
-from studyrunner.kinds.estimate import iterations_of_missions, missions_computed, seconds_of
+from studyrunner.kinds.estimate import iterations_of_sweep, seconds_of
 from studyrunner.kinds.missions.kind import OF_A_MISSION
 from studyrunner.kinds.results import deepest, describe_target, first_harmonic, named
 from studyrunner.points.table import Points
@@ -25,6 +25,18 @@ if TYPE_CHECKING:
     from solver.missions.mission import MissionHistory
 
 _NO_JOINT = tasks.TaskJoint(0, None)
+# Newton iterations, see `estimate`
+_OF_BLOCK = 20  # of a mission, after its start state (slider: 10 to 35)
+_OF_PASSAGE = 900  # (dovetail with 16 pairs, rtol 0.1: 970, 2500 with 40 frequencies, 330 where nothing slips)
+_AN_OCTAVE = 350  # of a wide passage (slider from 1 to 10 000 Hz: 5600, and 2700 of its reference solution)
+
+_MISSIONS_A_DOUBLING = 2.0
+"""Missions that are computed for each doubling of their number, by the history and again by its reference solution: 6
+of 20 on a slider, 18 to 26 of thousands on a dovetail, 42 of a million on a slider."""
+
+_A_WAY = 0.5
+"""Iterations of the way to a block in a later mission, over those of the first one (dovetail with 16 pairs: 150 to 190
+of 320 to 380; one pair that slips: 2 of 14 missions with 20 missions, 12 of 84 with a million)."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +86,7 @@ class Mission(tasks.Task):
         blocks = tuple(block.as_block(of_joints[block.joint]) for block in self.blocks)
         n_computed = itertools.count(1)
         # as many again for the reference solution
-        n_planned = 2 * max(1, missions_computed(self.missions[-1]))
+        n_planned = 2 * max(1, _n_computed(self.missions[-1]))
 
         def note(said: Packed | str) -> None:
             is_data = isinstance(said, Packed)
@@ -108,7 +120,7 @@ def build_tasks(study: Study, points: Points, n_displacements: Sequence[int]) ->
             number=0,
             scenes=scenes,
             settings=settings,
-            cost=seconds_of(n_unknowns, iterations_of_missions(ways, study.output_counts[-1])),
+            cost=seconds_of(n_unknowns, _iterations(ways, study.output_counts[-1])),
             n_unknowns=n_unknowns,
             blocks=blocks,
             law=law,
@@ -120,6 +132,24 @@ def build_tasks(study: Study, points: Points, n_displacements: Sequence[int]) ->
         )
         found.setdefault(task, []).extend(numbers)
     return tasks.number_points({task: [numbers] for task, numbers in found.items()}, points.n)
+
+
+def _n_computed(missions: float) -> int:
+    """Missions that are computed for a number of missions, by the history or by its reference solution."""
+    return math.ceil(min(missions, 2.0 + _MISSIONS_A_DOUBLING * math.log2(max(missions, 1.0))))
+
+
+def _iterations(blocks: Sequence[tuple[str, float | Passage]], missions: float) -> float:
+    """Newton iterations of a mission history. blocks: how each begins, and its frequency."""
+    each = 0.0
+    for begin, frequency in blocks:
+        if isinstance(frequency, Passage):
+            each += _OF_PASSAGE + _AN_OCTAVE * abs(math.log2(frequency.stop / frequency.start))
+        elif begin == "continue":
+            each += 2 * _OF_BLOCK
+        else:
+            each += _OF_BLOCK + _A_WAY * iterations_of_sweep(begin, 1)
+    return 2 * _n_computed(missions) * each
 
 
 def _blocks(

@@ -8,12 +8,16 @@ import numpy as np
 
 from solver.model import ReducedModel
 from studyrunner.kinds import task as tasks
-from studyrunner.kinds.estimate import iterations_of_mode, seconds_of
+from studyrunner.kinds.estimate import seconds_of
 from studyrunner.kinds.modes.kind import OF_A_MODE_POINT
 from studyrunner.kinds.results import first_harmonic, named
 from studyrunner.points.table import Points
 from studyrunner.study.study import Study
 from studyrunner.system.progress import count
+
+# Newton iterations
+_OF_MODE = 900  # to the first point of a mode; with two more unknowns it takes five times as long as forced vibration
+_A_MODE_POINT = 300  # each further amplitude, with errors (study `modes`: 3300 for 9; 30 where nothing slips)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,7 +74,7 @@ def build_tasks(study: Study, points: Points, n_displacements: Sequence[int]) ->
     found: dict[Mode, list[list[int]]] = {}
     for ((joint,), mode, direction, settings), amplitudes in modes.items():
         n_unknowns = tasks.n_unknowns_of(n_displacements[joint.scene], settings.harmonics)
-        first, whole = (iterations_of_mode(number) for number in (1, len(amplitudes)))
+        first, whole = _OF_MODE, _OF_MODE + _A_MODE_POINT * (len(amplitudes) - 1)
         task = Mode(
             number=0,
             scenes=(joint.scene,),

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from solver.contact.wear_law import WearLaw
 from solver.settings import ToTheEnd
-from studyrunner.kinds.estimate import iterations_of_histories, iterations_of_sweep, seconds_of
+from studyrunner.kinds.estimate import iterations_of_sweep, seconds_of
 from studyrunner.kinds.task import EQUAL_POINTS, TaskPlan, Work, n_unknowns_of
 from studyrunner.kinds.wear.histories import Excitation, History, Integrated, Sweep
 from studyrunner.kinds.wear.kind import OWN_STEPS
@@ -29,9 +29,15 @@ MOST_TOGETHER = 4
 """Histories of one task, which share the adaptive history that given steps are compared with. It takes about as long as
 one of them: with 4 a fifth more than with all, and another rank may take the rest."""
 
-_MOST_KNOWN = (
-    1000  # ways to share histories: with equal values most start states have the same, others one of their own
-)
+# Newton iterations, see `estimate`
+_A_STEP = 2.5  # in slow time, explicit or implicit (2 to 4 where the joint slips, dovetail 2.2)
+_AN_ADAPTIVE_STEP = 10  # with refused steps and the reference solution (36 and 48 pairs near the resonance: 4 to 13)
+_ADAPTIVE_STEPS = 40  # of a history
+_STEPS_TO_THE_END = 100  # of a history until nothing wears any more, with growing steps (20 pairs: 50 to 110)
+
+
+# ways to share histories: with equal values most start states have the same, others one of their own
+_MOST_KNOWN = 1000
 
 _REASONS = {
     "cycles": "only the unworn states are asked for, the same for every step and scheme",
@@ -231,8 +237,20 @@ def _together(study: Study, shared: Sequence[_Shared]) -> Iterator[_Together]:
         for first in range(0, len(group), MOST_TOGETHER):
             integrated, points = zip(*group[first : first + MOST_TOGETHER], strict=True)
             cycles = 0.0 if integrated[0].unworn else math.inf if study.to_the_end else study.output_counts[-1]
-            iterations = iterations_of_histories([(each.scheme, each.step) for each in integrated], cycles)
+            iterations = _iterations([(each.scheme, each.step) for each in integrated], cycles)
             yield _Together(integrated, tuple(itertools.chain.from_iterable(points)), iterations)
+
+
+def _iterations(steps: Sequence[tuple[str, float]], cycles: float) -> float:
+    """Newton iterations of histories over so many cycles where the joint wears. steps: scheme and step of each; those
+    with given steps are compared with the adaptive history.
+    """
+    if cycles == 0.0:
+        return _A_STEP
+    given = [step for scheme, step in steps if scheme not in ("adaptive", "final")]
+    n_steps = sum(max(1.0, cycles / step) if cycles < math.inf else _STEPS_TO_THE_END for step in given)
+    adaptive = _ADAPTIVE_STEPS if cycles < math.inf else _STEPS_TO_THE_END
+    return _AN_ADAPTIVE_STEP * adaptive + _A_STEP * n_steps
 
 
 WAYS = {
