@@ -53,6 +53,10 @@ class Kind:
     dimensions: Callable[[Any], Mapping[str, Sequence[str]]] = lambda _: {}
     coordinates: Mapping[str, Variable] = field(default_factory=dict)
 
+    def __reduce__(self) -> tuple[Callable[[str], "Kind"], tuple[str]]:
+        """A study that goes to another rank has there the same kind."""
+        return _named, (self.name,)
+
     @property
     def table(self) -> str:
         """Name of the table that marks it; empty where a key does."""
@@ -83,3 +87,8 @@ class Kind:
         - "figures": `FIGURES`, in the order of the page.
         """
         return import_module(f"{__package__}.{self.name}.{name}")
+
+
+def _named(name: str) -> Kind:
+    found: Kind = import_module(f"{__package__}.table").KINDS[name]
+    return found

@@ -1,5 +1,6 @@
 """Kinds of study: each reads what it names and no other key, one marks a study, and its results say which they are."""
 
+import pickle
 from itertools import permutations
 
 import pytest
@@ -28,6 +29,7 @@ def study_of(name, folder, overrides=()):
 def test_a_kind_names_what_it_has(kind, tmp_path):
     study = study_of(kind.name, tmp_path)
     assert study.kind is kind
+    assert pickle.loads(pickle.dumps(study)).kind is kind
     for part, names in PARTS.items():
         assert all(hasattr(kind.part(part), name) for name in names), part
     assert {*kind.axes, *kind.last_axes, *kind.other_axes} <= SECTIONS["axes"].model_fields.keys() & COORDINATES.keys()
