@@ -20,7 +20,6 @@ from fretwear import (
     Block,
     Outcome,
     SolverSettings,
-    Study,
     UserError,
     backbone,
     build_scene,
@@ -125,13 +124,6 @@ def test_a_study_gives_what_the_command_gives(result, tmp_path, monkeypatch):
             assert opened.fretwear.response().dtype == complex
 
 
-def test_overrides_are_values_or_texts():
-    study = read_study("sdof_slider", SMALL)
-    assert isinstance(study, Study)
-    assert study == read_study("sdof_slider", AS_TEXTS)
-    assert study.axes.frequency == tuple(FREQUENCIES)
-
-
 @pytest.mark.slow
 def test_a_run_that_is_interrupted_goes_on(tmp_path, monkeypatch):
     path, solver = tmp_path / "out.nc", Solver(monkeypatch)
@@ -227,14 +219,3 @@ def test_results_are_datasets_files_pictures_and_five_lines(tmp_path):
         axes = found.plot()
         assert axes.lines
         pyplot.close(axes.figure)
-
-
-def test_a_point_that_fails_is_one_point():
-    model, settings = build_scene("sdof_slider"), SolverSettings(time_limit=0.0)
-    curve = frequency_response(model, [150.0], 10.0, 0.5, settings=settings)
-    assert curve.outcome == (Outcome.TIME_LIMIT,)
-    assert np.isnan(curve.response).all()
-    history = march_wear(model, 150.0, 10.0, 0.5, 1e-11, 1e4, settings=settings)
-    assert history.outcome is Outcome.TIME_LIMIT
-    assert history.cycles.tolist() == [0.0, 1e4]
-    assert "time_limit" in repr(history)

@@ -7,7 +7,6 @@ from scipy.integrate import solve_ivp
 from solver import SolverSettings, backbone, build_model
 from tests import references
 from tests.benchmarks import time_integration as in_time
-from tests.benchmarks.free_decay import decay_of, free_decay
 from tests.solver.models import scene
 
 TWO_MASSES = ([[1, 0], [0, 1]], [[0.04, -0.02], [-0.02, 0.02]], [[2, -1], [-1, 1]], [20, 0], 1, 7.2)
@@ -113,6 +112,22 @@ def test_wear_of_a_slider_follows_its_differential_equation():
     assert depth[0] == pytest.approx(exact[-1], rel=1e-2)
 
 
+def decay_of(signal, step):
+    """Amplitude, frequency, Hz, and damping ratio of each cycle of a decaying signal (n_times,).
+
+    From its peaks up and down, each by a parabola through three samples: amplitude over half a cycle to both sides.
+    """
+    middle = signal[1:-1]
+    turns = 1 + np.flatnonzero((middle - signal[:-2]) * (signal[2:] - middle) < 0.0)
+    left, here, right = signal[turns - 1], signal[turns], signal[turns + 1]
+    offset = 0.5 * (left - right) / (left - 2.0 * here + right)
+    times, peaks = step * (turns + offset), here - 0.25 * (left - right) * offset
+    heights = 0.5 * np.abs(np.diff(peaks))
+    middles = 0.5 * (times[1:] + times[:-1])
+    rate = np.log(heights[:-2] / heights[2:])
+    return heights[1:-1], 1.0 / (middles[2:] - middles[:-2]), rate / np.hypot(2.0 * np.pi, rate)
+
+
 @pytest.mark.slow
 def test_a_nonlinear_mode_is_what_its_free_decay_shows_at_two_amplitudes():
     """As far as a mode of periodic motion describes a decay: the amplitude changes within a cycle."""
@@ -124,11 +139,13 @@ def test_a_nonlinear_mode_is_what_its_free_decay_shows_at_two_amplitudes():
     mode = backbone(model, modal, 0.5, settings=SolverSettings(harmonics=7, samples=128))
     tips = abs(mode.response[:, 0])
     structure = in_time.build(model, 0.5, float(mode.frequency[0]), 0.0, 200)
-    rest = in_time.at_rest(model, structure, model.contact.gap)
-    pulled = rest._replace(x=rest.x + 1.5 * tips[-1] * np.eye(3)[2])
-    signal = free_decay(structure, pulled, model.contact.gap, 90)[:, 2]
-    amplitude, frequency, damping = decay_of(signal, structure.step)
+    rest, seen = in_time.at_rest(model, structure, model.contact.gap), []
+    motion = rest._replace(x=rest.x + 1.5 * tips[-1] * np.eye(3)[2])
+    for _ in range(90):
+        motion = in_time.one_period(structure, motion, model.contact.gap)
+        seen.append(motion.responses[:, 2])
+    amplitude, frequency, damping = decay_of(np.concatenate(seen), structure.step)
     for place, tip in enumerate(tips.tolist()):
-        seen, damped = (np.interp(tip, amplitude[::-1], of[::-1]) for of in (frequency, damping))
-        assert seen == pytest.approx(mode.frequency[place], rel=2e-3)
+        swung, damped = (np.interp(tip, amplitude[::-1], of[::-1]) for of in (frequency, damping))
+        assert swung == pytest.approx(mode.frequency[place], rel=2e-3)
         assert damped == pytest.approx(mode.damping_ratio[place], rel=0.05)

@@ -1,19 +1,18 @@
-"""Estimated over true errors of worn volumes: bundled dovetail and random small joints, all schemes and steps.
+"""Estimated over true errors of worn volumes of the bundled dovetail: all schemes and steps, and random loads.
 
-    python -m tests.benchmarks.error_bars --mesh 1 2 --random 200
+    python -m tests.benchmarks.error_bars --mesh 1 2
     python -m tests.benchmarks.error_bars --mesh 1 --diameter 3 7 --frequency -0.25 0.25
     python -m tests.benchmarks.error_bars --mesh --loads 60 [--rtol 1e-1 1e-2] [--truth 0] [--records FILE.csv]
     python -m tests.benchmarks.error_bars --mesh --records FILE.csv --picture FILE.png
 
 The truth of a dovetail is the adaptive scheme with a tolerance of 1e-3, from the start state of a sweep in steps five
-times as fine; that of a random joint the same with 13 harmonics for its five. That of a random load has a third of the
-smallest `--rtol`, at least 1e-4, and automatic harmonics: with 13 and 256 samples the truth of load 46 is 4 % off. Of
-histories with 1e-4 it tells the start state alone. With `--truth 0` there is none, as it takes minutes: a difference is
-0 and the error at most the estimated one. Random loads are adaptive histories of mesh 1 near its resonance,
-5e4 to 6e5 cycles; `--loads 20 40` are those from 20 to 39. A file of records, which a new run replaces, has each row as
-soon as it is computed, and the last command shows what it has by then. Wanted: at least half the true error everywhere,
-in the median not more than ten times it. Differences below the error of the truth, or below `FLOOR` of the volume, do
-not count: the truth is not known better.
+times as fine. That of a random load has a third of the smallest `--rtol`, at least 1e-4, and automatic harmonics: with
+13 and 256 samples the truth of load 46 is 4 % off. Of histories with 1e-4 it tells the start state alone. With
+`--truth 0` there is none, as it takes minutes: a difference is 0 and the error at most the estimated one. Random loads
+are adaptive histories of mesh 1 near its resonance, 5e4 to 6e5 cycles; `--loads 20 40` are those from 20 to 39. A file
+of records, which a new run replaces, has each row as soon as it is computed, and the last command shows what it has by
+then. Wanted: at least half the true error everywhere, in the median not more than ten times it. Differences below the
+error of the truth, or below `FLOOR` of the volume, do not count: the truth is not known better.
 
 Columns: relative errors of the worn volume at the end: estimated, difference to the truth, of the truth; ratio of the
 first two; the smallest ratio of volumes and of responses on the way; that of the depths of all pairs that have a tenth
@@ -43,7 +42,7 @@ from solver.settings import Scheme, SolverSettings
 from studyrunner.report.drawing import WIDTH, add_legend, line_style, set_log, style
 from studyrunner.units import show_percent
 from tests.benchmarks.frame import Table, arguments
-from tests.solver.models import branch_states, glued_frequency, march_wear, random_model, scene
+from tests.solver.models import branch_states, glued_frequency, march_wear, scene
 
 WEAR = 1.1e-11  # 1/Pa
 STEPS = [250.0, 500.0, 1000.0, 2000.0]
@@ -51,7 +50,6 @@ FREQUENCIES = {1: (212.5, 212.75, 213.0, 213.25), 2: (211.0, 211.25, 211.375, 21
 OFFSETS = (-0.25, 0.25)  # Hz, from the resonance of the glued structure, of travelling waves
 HARMONICS = 39  # whose nodal diameters the scene holds
 FLOOR = 2e-3
-KINDS = (("3d", "3d"), ("3d", "one_tangent"), ("one_tangent", "one_tangent", "3d"))
 RATIOS = ("on the way", "responses", "depths")
 COLUMNS = (
     *("rtol", "estimated", "difference", "of the truth", "ratio", *RATIOS),
@@ -204,39 +202,14 @@ def random_loads(seeds: range, rtols: list[float], records: Path | None, *, with
     summarise(table.frame)
 
 
-def random_joints(n: int) -> None:
-    """Small joints of random structures, steps from a twentieth of the explicit limit to half of it."""
-    table = Table("random joints", *COLUMNS)
-    settings, exact = SolverSettings(harmonics=5, samples=64), SolverSettings(harmonics=13, samples=256, rtol=3e-4)
-    for seed in range(n):
-        random, model = np.random.default_rng(seed), random_model(seed, KINDS[seed % len(KINDS)])
-        amplitude = float(random.uniform(40.0, 150.0))
-        (start,), (fine,) = (branch_states(model, 0.4, amplitude, [600.0], given) for given in (settings, exact))
-        if start.state is None or fine.state is None:
-            continue
-        limit = march_wear(model, 0.4, start, WEAR, 1.0, "implicit", np.array([0.0]), settings).step_limit
-        if not np.isfinite(limit):
-            continue
-        step = float(limit * random.choice([0.05, 0.15, 0.5]))
-        cycles = np.linspace(0.0, 24.0 * step, 13)
-        truth = march_wear(model, 0.4, fine, WEAR, step, "adaptive", cycles, exact)
-        for scheme in ("implicit", "explicit", "adaptive"):
-            history = march_wear(model, 0.4, start, WEAR, step, scheme, cycles, settings)
-            name = f"joint {seed}, {scheme} {step / limit:.2g} of the limit"
-            table.row(name, *compare(history, truth, settings.rtol))
-    summarise(table.frame)
-
-
 def main() -> None:
     lists = {"mesh": [1], "diameter": [0], "loads": [0], "rtol": [1e-2], "step": STEPS, "frequency": [0.0]}
-    given = arguments(__doc__, **lists, random=0, records=None, picture=None, truth=1)
+    given = arguments(__doc__, **lists, records=None, picture=None, truth=1)
     for mesh, diameter in product(given.mesh, given.diameter):
         model = scene("dovetail_sector", HARMONICS, mesh=mesh, nodal_diameter=diameter)
         frequencies = np.array(given.frequency if any(given.frequency) else OFFSETS if diameter else FREQUENCIES[mesh])
         first = glued_frequency(model) if diameter else 0.0
         dovetail(f"mesh {mesh}, d {diameter}", model, given.step, first + frequencies)
-    if given.random:
-        random_joints(given.random)
     if any(given.loads):
         random_loads(range(*given.loads), given.rtol, given.records, with_truth=bool(given.truth))
     if given.picture:

@@ -85,17 +85,23 @@ def of_curve(found: solver.ResponseCurve) -> Values:
 # --- models and cases ---
 
 
-def block(*pairs: Sequence[int], ground=(1e5, 1e5, 1e5), static=(100.0, 0.0, 0.0), lift: float = 0.0) -> ReducedModel:
+def block(
+    *pairs: Sequence[int], ground=(1e5, 1e5, 1e5), static=(100.0, 0.0, 0.0), lift: float = 0.0, ratio: float = 2.0
+) -> ReducedModel:
     """A rigid block of 1 kg on elastic pairs without mass, which vibrates along both tangents.
 
     pairs: components of each: closing, first and second tangent; two with all of them if not given. ground: N/m, all
     that holds the block but friction. static: N. lift: vibrating force along the normal over that along a tangent.
+    ratio: stiffness of the second pair over that of the first; each further one has as much more as the second.
     """
     pairs = pairs or ((0, 1, 2), (0, 1, 2))
     places, components = np.array([(place, component) for place, pair in enumerate(pairs) for component in pair]).T
     n, dofs = 3 + components.size, np.full((len(pairs), 3), -1)
     dofs[places, components] = np.arange(3, n)
-    ties, springs = np.eye(n)[components] - np.eye(n)[3:], 1e7 * (1 + places) * np.where(components > 0, 0.5, 1.0)
+    ties, springs = (
+        np.eye(n)[components] - np.eye(n)[3:],
+        1e7 * (1 + places * (ratio - 1)) * np.where(components > 0, 0.5, 1.0),
+    )
     stiffness, none = ties.T @ np.diag(springs) @ ties + np.diag([*ground, *np.zeros(n - 3)]), np.zeros(n - 3)
     loads = {"load_static": [*static, *none], "load_harmonic": [lift, 1.0, 0.5j, *none], "response": [1, 2]}
     mass, pressed = np.diag([1.0, 1.0, 1.0, *none]), np.where(dofs[:, 0] < 0, 0.5 * static[0], 0.0)

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from solver import build_model
 from solver.accuracy.certificate import certify
 from solver.harmonic_balance.state import Failure
 from solver.model import ReducedModel
@@ -18,6 +17,7 @@ from solver.outcome import COMPLETE, Outcome
 from solver.results.state_report import evaluated
 from solver.settings import Scheme, SolverSettings
 from tests.benchmarks.random_scenes import run_scene, solved
+from tests.benchmarks.values import block as build_block
 from tests.random_scenes import random_scene
 from tests.solver.models import OMEGA, case_of, dovetail, glued_frequency, march_wear, random_model, scene, sweep_of
 
@@ -48,24 +48,9 @@ class Case:
 ELASTIC = Case(random_model(1, ("3d",) * 3), OMEGA)
 
 
-def block(stiffness=(1e7, 2e7), *, ground=1e5, preload=100.0, lift=0.0):
-    """A rigid block of 1 kg on elastic pairs without mass, pressed on, pushed along both tangents.
-
-    stiffness: N/m, of each pair, half as much along the tangents. ground: N/m, all that holds the block but friction.
-    preload: N, on the block. lift: vibrating force along the normal over that along the first tangent.
-    """
-    n_pairs = len(stiffness)
-    n = 3 + 3 * n_pairs
-    k = np.zeros((n, n))
-    k[:3, :3] = ground * np.eye(3)
-    ties = np.hstack([np.tile(np.eye(3), (n_pairs, 1)), -np.eye(3 * n_pairs)])
-    k += ties.T @ (np.outer(stiffness, [1.0, 0.5, 0.5]).reshape(-1, 1) * ties)
-    mass, load_static = np.diag([1.0] * 3 + [0.0] * (n - 3)), preload * np.eye(n)[0]
-    load_harmonic = np.pad([lift, 1.0, 0.5j], (0, n - 3))
-    # 2 % of critical damping, of the block on its pairs
-    c, dofs = 0.04 / np.sqrt(max(stiffness)) * k, 3 + np.arange(3 * n_pairs).reshape(n_pairs, 3)
-    loads = {"load_static": load_static, "load_harmonic": load_harmonic, "response": [1, 2]}
-    return Case(build_model(mass, c, k, dofs, 1e-4, **loads), BLOCK)
+def block(**given):
+    """A block on two pairs that sticks, slips and opens."""
+    return Case(build_block(**given), BLOCK)
 
 
 def slider(stiffness=1e5, omega=2 * np.pi * 160.0):
@@ -150,7 +135,7 @@ def extreme_cases():
     yield "no damping, elastic", free, COMPLETE
     yield "no damping, block", scaled(block(), "damping", 0.0), COMPLETE
     # no load but a vibrating one on pairs that just touch: predicted forces whose squares underflow
-    yield "1e-160 N", replace(block(preload=0.0, lift=0.2), amplitude=1e-160), (Outcome.CERTIFICATE_FAILED,)
+    yield "1e-160 N", replace(block(static=(0.0, 0.0, 0.0), lift=0.2), amplitude=1e-160), (Outcome.CERTIFICATE_FAILED,)
 
 
 EXTREMES = {name: (case, outcomes) for name, case, outcomes in extreme_cases()}
@@ -166,14 +151,14 @@ def test_extreme_cases_end_honestly(name):
 @pytest.mark.slow
 @pytest.mark.parametrize("amplitude", [25.0, 5e-5])
 def test_a_blade_that_is_unseated_or_hardly_loaded_has_states(amplitude):
-    settings = SolverSettings(3, 64)
-    run_converged(Case(dovetail(), 2 * np.pi * 212.5, 0.5, amplitude, 1.1e-11, 3e3, 1e3, settings=settings))
+    settings = SolverSettings(3, 64, rtol=0.1)
+    run_converged(Case(dovetail(), 2 * np.pi * 212.5, 0.5, amplitude, 1.1e-11, 1e3, 1e3, settings=settings))
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("ratio", [1e-8, 1e4])
 def test_contact_stiffness_ratio(ratio):
-    history = run_converged(block((1e7, 1e7 * ratio)))
+    history = run_converged(block(ratio=ratio))
     # the stiffer of two pairs on one rigid block carries the load
     carried = history.mean_pressure[0] * 1e-4
     assert carried.sum() == pytest.approx(100.0, rel=0.05)
@@ -199,8 +184,8 @@ def test_gaps_never_reached():
 def test_hundreds_of_pairs():
     # one tangent each and a constant load: the same with closing displacements takes fifty times as long
     settings = SolverSettings(1, 32)
-    case = Case(random_model(3, ("constant_load_one_tangent",) * 200), OMEGA, amplitude=20.0, settings=settings)
-    history = run_converged(case)
+    model = random_model(3, ("constant_load_one_tangent",) * 200)
+    history = run_converged(Case(model, OMEGA, amplitude=20.0, cycles=2.0 * CYCLES / 10, settings=settings))
     assert 0 < (history.wear_depth[-1] > 0.0).sum() < 200
 
 
@@ -211,7 +196,7 @@ WITHOUT_STATE = [
     *((Outcome.CERTIFICATE_FAILED, replace(RESONANT, friction=friction)) for friction in (0.0, 0.7)),
     (Outcome.START_FAILED, scaled(ELASTIC, "stiffness", -1.0)),
     (Outcome.TIME_LIMIT, replace(ELASTIC, settings=replace(SETTINGS, time_limit=1e-9))),
-    (Outcome.UNSETTLED, replace(block(ground=0.0, lift=0.3), amplitude=1e3, settings=FEW)),
+    (Outcome.UNSETTLED, replace(block(ground=(0.0, 0.0, 0.0), lift=0.3), amplitude=1e3, settings=FEW)),
 ]
 
 

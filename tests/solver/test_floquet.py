@@ -88,6 +88,7 @@ def test_a_growing_vibration_is_no_result(name, matrices, asked):
     assert (history.outcome,) == found.outcome == (Outcome.UNSTABLE,)
     assert (history.message,) == found.message
     assert np.isnan([*found.response, *history.response]).all()
+    assert all(history.message in repr(each) for each in (found, history))
 
 
 def test_a_state_that_sticks_all_over_is_that_of_its_structure():

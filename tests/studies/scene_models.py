@@ -1,6 +1,7 @@
 """Small random reduced models, and scene files made from them by changing single datasets."""
 
 from collections.abc import Callable
+from dataclasses import fields
 from pathlib import Path
 
 import h5py
@@ -45,6 +46,14 @@ def sector() -> ReducedModel:
     """6 sectors, nodal diameter 2: harmonics see 0 and 2."""
     models = {0: linear_model(8, hermitian=False, seed=2), 2: linear_model(7, hermitian=True, seed=3)}
     return general_model(models, n_sectors=6, nodal_diameter=2)
+
+
+def bits(model: ReducedModel) -> list[object]:
+    """All that a model holds, in a form that is equal only to the last bit and to the layout in memory."""
+    values = [model.response_names, model.n_sectors, model.nodal_diameter, *model.linear]
+    for part in (model.contact, *model.linear.values()):
+        values += [getattr(part, each.name) for each in fields(part)]
+    return [(v.dtype, v.shape, v.strides, v.tobytes()) if isinstance(v, np.ndarray) else v for v in values]
 
 
 def changed(path: Path, *changes: Change) -> Path:

@@ -93,7 +93,7 @@ def mindlin_amplitude(share):
 
 @pytest.mark.slow
 def test_the_sphere_moves_as_mindlin_says():
-    model, history, slips = worn("sphere_on_flat", [0.0, 1e6], 1e-3, patches=8)
+    model, history, slips = worn("sphere_on_flat", [0.0, 1e6], 1e-2, patches=8)
     radius, c = np.linalg.norm(model.contact.position, axis=1), A_POINT * np.cbrt(0.5)
     width = float(np.sqrt(model.contact.area[0])) / 2.0
     assert radius[~slips].max() < c + 0.5 * width
@@ -206,7 +206,8 @@ def test_a_sliding_that_is_prescribed_wears_as_archard_says(name, values, load):
     for sliding in (1e-6, 1e-5):
         model = build_scene(name, sliding=sliding, **values)
         assert model.response_names == ("slip",)
-        history = march_wear(model, 20.0, 1.0, MU, 1e-13, [0.0, 1e-4 / sliding], sweep="ramp")
+        cycles, settings = [0.0, 1e-4 / sliding], SolverSettings(harmonics=5, samples=64)
+        history = march_wear(model, 20.0, 1.0, MU, 1e-13, cycles, sweep="ramp", settings=settings)
         assert history.outcome.complete
         assert history.worn_volume[-1] == pytest.approx(4.0 * 1e-13 * load * 1e-4, rel=1e-3)
     with pytest.raises(SceneError, match=r"^sliding: 1e-06;"):

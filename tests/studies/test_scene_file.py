@@ -1,6 +1,6 @@
 """Scene files: bitwise round trip, other writers' habits, and wrong files, named by their dataset."""
 
-from dataclasses import astuple, replace
+from dataclasses import replace
 from types import SimpleNamespace
 
 import h5py
@@ -15,6 +15,7 @@ from studies.scene_error import SceneError
 from studies.scene_file import read_mesh, read_scene, scene_datasets, write_scene
 from tests.studies.scene_models import (
     attribute,
+    bits,
     changed,
     drop,
     general_model,
@@ -25,13 +26,6 @@ from tests.studies.scene_models import (
     sector,
     written,
 )
-
-
-def bits(model):
-    """All that a model holds, in a form that is equal only to the last bit."""
-    values = [model.response_names, model.n_sectors, model.nodal_diameter, *astuple(model.contact), *model.linear]
-    values += [each for linear in model.linear.values() for each in astuple(linear)]
-    return [(v.dtype, v.shape, v.tobytes()) if isinstance(v, np.ndarray) else v for v in values]
 
 
 def with_pairs(**values):

@@ -86,19 +86,6 @@ def test_values_are_those_of_a_rectangular_study_to_the_last_bit(folder):
             np.testing.assert_array_equal(alone[name].squeeze(), same[name].squeeze(), err_msg=name)
 
 
-def test_each_row_of_a_design_is_a_study_of_its_own():
-    """Of 200 rows with scenes that differ each has the task that it has alone."""
-    low, high = [150.0, 0.3, 8.0, 1e-12], [170.0, 0.6, 12.0, 1e-11]
-    names = ("frequency", "friction_coefficient", "normal_load", "wear_coefficient")
-    rows = qmc.scale(qmc.LatinHypercube(4, rng=1).random(200), low, high)
-    rows[:, 2] = np.round(rows[:, 2])
-    adaptive = {"axes.scheme": "adaptive"}
-    found = names_of(read_study("sdof_slider", adaptive, (rows, names)))
-    for row in range(0, 200, 7):
-        own = {f"axes.{name}": value for name, value in zip(names, rows[row].tolist(), strict=True)}
-        assert names_of(read_study("sdof_slider", adaptive | own)) == [found[row]]
-
-
 def test_designs_of_other_programs_are_taken_as_they_are(folder):
     """A matrix and names, as of SALib, pyDOE and scipy.qmc; columns by name; a table of pandas; a file."""
     names, matrix = ["frequency", "normal_load"], qmc.scale(qmc.Sobol(2, rng=1).random(4), [150, 8], [170, 12])

@@ -61,10 +61,13 @@ def test_an_exception_is_one_bad_point(solver, capsys):
 
     solver.disturb = fail
     assert main(TWO_WAYS) == 3
-    assert any(line.startswith("failed") for line in capsys.readouterr().out.splitlines())
+    said = capsys.readouterr().out
+    assert f"{N_POINTS - 1} computed, 1 failed" in said
+    assert "\nfailed" in said
     found = results()
     bad = {"frequency": 100.0, "sweep": "down", "wear_coefficient": 1e-11}
     assert found.outcome.sel(bad).item() == Outcome.EXCEPTION
+    assert found.worn_volume.sel(bad).isnull().all()
     line = str(found.message.sel(bad).item())
     assert line.startswith("ZeroDivisionError: a bug in the solver (fail, test_going_on.py, line ")
     good = found.outcome == 0

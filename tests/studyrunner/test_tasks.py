@@ -19,7 +19,7 @@ from studyrunner.plan import doubts_of_study, effort_of
 from studyrunner.study.study_file import bundled_studies, read_study
 from tests.mpi.launching import options, results
 from tests.studyrunner.faked_runs import history
-from tests.studyrunner.fakes import FACTS, changed, plan_of, points_of, totals_of, without_values
+from tests.studyrunner.fakes import FACTS, changed, plan_of, points_of, totals_of
 
 SHARED = ("axes.wear_coefficient=[0, 1e-12, 1e-11]", "axes.scheme=['adaptive', 'implicit', 'explicit']")
 GRID = (
@@ -149,18 +149,6 @@ def answer(capsys):
 def at_the_second_frequency(change):
     """Of the stand-in for the solver: another result there."""
     return lambda task, result: change(result) if task.position == 1 else result
-
-
-def test_points_that_failed(folder, solver, capsys):
-    solver.change = at_the_second_frequency(lambda result: without_values(result, int(Outcome.MARCH_FAILED)))
-    assert main(RUN) == 3
-    rows = answer(capsys)
-    assert "2 computed, 1 failed" in rows["out.nc:"]
-    assert "110 Hz" in rows["failed"]
-    assert "2 of 3 worn volumes" in rows["certainty"]
-    result = results().squeeze()
-    assert result.outcome.values.tolist() == [0, int(Outcome.MARCH_FAILED), 0]
-    assert result.worn_volume.isnull().all("cycle").values.tolist() == [False, True, False]
 
 
 @pytest.mark.parametrize("outcome", [Outcome.INACCURATE, Outcome.SENSITIVE])

@@ -14,8 +14,13 @@ from tests.studies.fe_models.solid_meshes import run_ccx
 SECTOR = Path(__file__).parent / "calculix_sector.inp"
 """A deck of 12 sectors that CalculiX runs: a root that is tied, a centrifugal prestress, and the export of matrices."""
 
-CUBES, PART = (SECTOR.with_name(f"{name}.inp").read_text(encoding="ascii") for name in ("cubes", "part"))
-"""Two cubes of different kinds, with all that a deck may hold; a part and its instance, as Abaqus writes them."""
+CUBES, PART, BLOCKS, SECTORS = (
+    SECTOR.with_name(f"{name}.inp").read_text(encoding="ascii") for name in ("cubes", "part", "blocks", "ring")
+)
+"""Two cubes of different kinds, with all that a deck may hold; a part and its instance, as Abaqus writes them; two
+blocks of 40 by 10 by 5 mm on each other, the lower one held at its left end; a disk and a rim on it, each a sector of
+twelve with cut faces of its own, where nothing is held.
+"""
 
 
 def write(folder: Path, text: str, name: str = "deck.inp") -> Path:
@@ -23,74 +28,6 @@ def write(folder: Path, text: str, name: str = "deck.inp") -> Path:
     path = folder / name
     path.write_bytes(text.encode("latin-1"))
     return path
-
-
-def hexes(first, shape, place):
-    """Lines of nodes, numbered with the first direction fastest, and of hexahedra of a grid; place: of its points."""
-    n = np.array(shape) + 1
-    grid = [(a, b, c) for c in range(n[2]) for b in range(n[1]) for a in range(n[0])]
-    number = {at: first + k for k, at in enumerate(grid)}
-    nodes = [f"{number[at]}, " + ", ".join(f"{value:.12g}" for value in place(*at)) for at in grid]
-    corners = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
-    cells = [at for at in grid if all(at < end for at, end in zip(at, shape, strict=True))]
-    elements = [
-        f"{first + k}, " + ", ".join(str(number[x + a, y + b, z + c]) for a, b, c in corners)
-        for k, (x, y, z) in enumerate(cells)
-    ]
-    return nodes, elements
-
-
-_LOWER, _UPPER = (
-    hexes(first, (4, 2, 1), lambda x, y, z, height=height: (10 * x, 5 * y, height + 5 * z))
-    for first, height in ((1, 0), (101, 5))
-)
-
-BLOCKS = "\n".join(
-    [
-        *("*NODE, NSET=ALLN", *_LOWER[0], *_UPPER[0]),
-        *("*ELEMENT, TYPE=C3D8, ELSET=ELOW", *_LOWER[1], "*ELEMENT, TYPE=C3D8, ELSET=EUP", *_UPPER[1]),
-        *("*ELSET, ELSET=EALL1", "ELOW, EUP", "*NSET, NSET=XF", "1, 6, 11, 16, 21, 26", "*NSET, NSET=XM", "5, 10, 15"),
-        *("*NSET, NSET=XE", "5, 10, 15, 20, 25, 30", "*NSET, NSET=TIP", "119, 124, 129"),
-        *("*MATERIAL, NAME=STEEL", "*ELASTIC", "210000., 0.3", "*DENSITY", "7.85E-9"),
-        *("*SOLID SECTION, ELSET=EALL1, MATERIAL=STEEL", "*SURFACE, NAME=SLOW", "ELOW, S2", "*SURFACE, NAME=SUP"),
-        *("EUP, S1", "*SURFACE, NAME=SE", "4, S4", "8, S4", "*SURFACE INTERACTION, NAME=SI", "*FRICTION", "0.4"),
-        *("*CONTACT PAIR, INTERACTION=SI", "SUP, SLOW", "*BOUNDARY", "XF, 1, 3", ""),
-    ]
-)
-"""Two blocks of 40 by 10 by 5 mm on each other, the lower one held at its left end."""
-
-
-def _ring(first, inner, outer):
-    """Nodes and elements of a sector of 30 degrees, 10 mm high, between two radii."""
-
-    def place(r, j, k):
-        radius, angle = (outer if r else inner), np.radians(10 * j - 15)
-        return radius * np.cos(angle), radius * np.sin(angle), 5 * k
-
-    return hexes(first, (1, 3, 2), place)
-
-
-_DISK, _RIM = _ring(1, 20, 25), _ring(101, 25, 30)
-
-SECTORS = "\n".join(
-    [
-        *("*NODE", *_DISK[0], *_RIM[0], "*ELEMENT, TYPE=C3D8, ELSET=EI", *_DISK[1], "*ELEMENT, TYPE=C3D8, ELSET=EO"),
-        *(*_RIM[1], "*ELSET, ELSET=EALL1", "EI, EO", "*NSET, NSET=TIP", "102, 104, 106, 108, 110, 112, 114, 116"),
-        *("*NSET, NSET=BORE, GENERATE", "1, 23, 2", "*NSET, NSET=INSIDE", "3, 5, 7, 11, 13, 15, 19, 21, 23"),
-        *("*MATERIAL, NAME=STEEL", "*ELASTIC", "210000., 0.3", "*DENSITY", "7.85E-9"),
-        *("*SOLID SECTION, ELSET=EALL1, MATERIAL=STEEL", "*SURFACE, NAME=SIN", "EI, S4", "*SURFACE, NAME=SOUT"),
-        *("EO, S6", "*SURFACE, NAME=LI, TYPE=NODE", "1,", "2,", "9,", "10,", "17,", "18,"),
-        *("*SURFACE, NAME=RI, TYPE=NODE", "7,", "8,", "15,", "16,", "23,", "24,"),
-        *("*SURFACE, NAME=LO, TYPE=NODE", "101,", "102,", "109,", "110,", "117,", "118,"),
-        *("*SURFACE, NAME=RO, TYPE=NODE", "107,", "108,", "115,", "116,", "123,", "124,"),
-        *("*TIE, CYCLIC SYMMETRY, NAME=CI, POSITION TOLERANCE=0.1", "LI, RI"),
-        *("*TIE, CYCLIC SYMMETRY, NAME=CO, POSITION TOLERANCE=0.1", "LO, RO"),
-        *("*CYCLIC SYMMETRY MODEL, N=12, TIE=CI, NGRAPH=1", "0., 0., 0., 0., 0., 1."),
-        *("*CYCLIC SYMMETRY MODEL, N=12, TIE=CO, NGRAPH=1", "0., 0., 0., 0., 0., 1."),
-        *("*SURFACE INTERACTION, NAME=SI", "*FRICTION", "0.3", "*CONTACT PAIR, INTERACTION=SI", "SOUT, SIN", ""),
-    ]
-)
-"""A disk and a rim on it, each a sector of twelve with cut faces of its own; nothing is held."""
 
 
 def prepared_deck(folder, text, nodal_diameter=0, **given):

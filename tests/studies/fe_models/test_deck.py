@@ -1,6 +1,7 @@
 """Decks come out as they are written: meshes, sets, instances, contact, loads; and what of a deck is skipped."""
 
 import re
+from itertools import product
 
 import numpy as np
 import pytest
@@ -8,7 +9,7 @@ import pytest
 from studies.fe_models.deck.contents import Material, SurfacePair
 from studies.fe_models.deck.read import read_deck
 from studies.scene_error import SceneError
-from tests.studies.fe_models.decks import BLOCKS, CUBES, PART, hexes, prepared_deck, write
+from tests.studies.fe_models.decks import BLOCKS, CUBES, PART, prepared_deck, write
 
 
 def line_of(text):
@@ -127,9 +128,14 @@ def test_case_line_ends_and_blanks_do_not_matter(tmp_path, cubes, name):
     assert len(deck.centrifugal) == len(deck.skipped) == 1
 
 
-HEADS = "*NODE, NSET=N", "*ELEMENT, TYPE=C3D8, ELSET=E"
-PARTS = zip(HEADS, hexes(1, (2, 2, 2), lambda x, y, z: (x, 2 * y, 0.5 * z)), strict=True)
-GRID, CELLS = ("\n".join([head, *lines, ""]) for head, lines in PARTS)
+CORNERS = (1, 2, 5, 4, 10, 11, 14, 13)  # of the first of two by two by two hexahedra, x fastest
+GRID = "*NODE, NSET=N\n" + "".join(
+    f"{n}, {x}, {2 * y}, {0.5 * z}\n" for n, (z, y, x) in enumerate(product(range(3), repeat=3), 1)
+)
+CELLS = "*ELEMENT, TYPE=C3D8, ELSET=E\n" + "".join(
+    ", ".join(map(str, (n, *(x + 3 * y + 9 * z + corner for corner in CORNERS)))) + "\n"
+    for n, (z, y, x) in enumerate(product(range(2), repeat=3), 1)
+)
 MADE_NODES = """\
 *NODE
 1, 0, 0, 0
