@@ -58,7 +58,7 @@ class Tried:
 class Allowable(Ended):
     """The amplitude at which the wear meets its target at the last cycle count.
 
-    - amplitude, error: N. Where the wear jumps past the target, the amplitude before the jump. inf: no amplitude wears
+    - amplitude, error: N. Where the wear is steep or jumps past the target, the amplitude before. inf: none wears
       so much. NaN: a history that is needed failed.
     - history: at this amplitude, or the last one that was tried.
     - tried: all amplitudes, ascending.
@@ -230,6 +230,9 @@ def _judged(search: _Search, root: float, rtol: float) -> Allowable:
     below = max((each for each in known if each.wear <= 1.0), key=lambda each: each.amplitude)
     above = min((each for each in known if each.wear > 1.0), key=lambda each: each.amplitude)
     here, width, note = search.at(root), above.amplitude - below.amplitude, ""
+    if here.wear > 1.0 + SHARE_OF_RTOL * rtol:
+        # where the wear is steep, the amplitude on the safe side
+        here = below
     error = (abs(here.wear - 1.0) + here.error) * width / max(above.wear - below.wear, 1e-300)
     if above.wear > JUMP * below.wear and width <= 2.0 * SHARE_OF_RTOL * rtol * root:
         here, error = below, width

@@ -306,8 +306,8 @@ def plan_rows(study: Study) -> Iterator[tuple[str, str]]:
         yield "frequency", what if end == 0.0 else f"{what} and followed while the joint wears"
     if study.allowable:
         (quantity, value), *_ = (study.slow_time.until or {}).items()
-        yield "amplitude", f"the one with which {quantity} is {value:g} after {end:g} cycles, by about"
-        f" {HISTORIES_OF_SEARCH} histories"
+        met = f"the one with which {quantity} is {value:g} after {end:g} cycles"
+        yield "amplitude", f"{met}, found by about {HISTORIES_OF_SEARCH} histories"
     if study.to_the_end:
         until = f"until the wear rate of every pair is below {study.slow_time.final_share:g} of its largest"
         yield "cycles", f"{until}; {n_stored} states are stored, spaced evenly in worn volume and cycles"
