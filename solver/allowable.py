@@ -33,6 +33,9 @@ MOST_TRIED = 30
 SHARE_OF_RTOL = 0.25
 """Part of `rtol` that is left: of the amplitude, and of the wear."""
 
+BEYOND = 1.5
+"""Wear over target at which a history ends: those near the target have values at all counts."""
+
 JUMP = 1.2
 """Ratio of the wear of two such amplitudes from which on it is a jump."""
 
@@ -42,8 +45,8 @@ JUMP = 1.2
 class Tried:
     """A history at an amplitude, N.
 
-    wear: over the target at the last cycle count, or the last count over that of the target, where the history ends
-    there; NaN where the history failed. error: of it.
+    wear: over the target at the last cycle count, or, where the history ends at `BEYOND` times the target, this ratio
+    times that of the last count and the one reached; NaN where the history failed. error: of it.
     """
 
     amplitude: float
@@ -55,7 +58,7 @@ class Tried:
 class Allowable(Ended):
     """The amplitude at which the wear meets its target at the last cycle count.
 
-    - amplitude, error: N. Where the wear jumps past the target, the amplitude before the jump. inf: no amplitude wears
+    - amplitude, error: N. Where the wear is steep or jumps past the target, the amplitude before. inf: none wears
       so much. NaN: a history that is needed failed.
     - history: at this amplitude, or the last one that was tried.
     - tried: all amplitudes, ascending.
@@ -90,12 +93,17 @@ def allowable_amplitude(
     check("until", until.quantity in TARGETS[:2], f'give "{TARGETS[0]}" or "{TARGETS[1]}"')
     check("wear_coefficient", wear_coefficient > 0.0, "give one above 0: nothing wears")
     check("cycles", 0.0 < np.max(cycles) < math.inf, "give a last count above 0, not inf")
-    more = {**options, "settings": settings, "until": until}
+    more = {**options, "settings": settings, "until": stopping_at(until)}
 
     def history_at(amplitude: float) -> WearHistory:
         return march_wear(model, frequency, amplitude, friction_coefficient, wear_coefficient, cycles, **more)
 
     return find_allowable(history_at, until, settings.rtol)
+
+
+def stopping_at(until: WearTarget) -> WearTarget:
+    """The target at which histories of a search for another target end."""
+    return replace(until, value=BEYOND * until.value)
 
 
 def find_allowable(
@@ -105,7 +113,8 @@ def find_allowable(
     known: tuple[Tried, ...] = (),
     keep: Callable[[tuple[Tried, ...]], None] = lambda _: None,
 ) -> Allowable:
-    """As `allowable_amplitude`, of a function from the amplitude, N, to the history, which ends at the target.
+    """As `allowable_amplitude`, of a function from the amplitude, N, to the history, which may end where `stopping_at`
+    says. Calls it last with the amplitude of the result.
 
     known, keep: what an earlier search has given to `keep`, after each history; the result is equal to the last bit.
     """
@@ -179,7 +188,7 @@ class _Search:
 def _compared(amplitude: float, history: WearHistory, until: WearTarget) -> Tried:
     """What a history says about its amplitude."""
     if not math.isnan(count := history.cycles_to_target):
-        wear = float(history.cycles[-1]) / count
+        wear = BEYOND * float(history.cycles[-1]) / count
         return Tried(amplitude, wear, wear * history.cycles_to_target_error / count)
     if not history.outcome.complete:
         return Tried(amplitude, math.nan, math.inf)
@@ -221,6 +230,9 @@ def _judged(search: _Search, root: float, rtol: float) -> Allowable:
     below = max((each for each in known if each.wear <= 1.0), key=lambda each: each.amplitude)
     above = min((each for each in known if each.wear > 1.0), key=lambda each: each.amplitude)
     here, width, note = search.at(root), above.amplitude - below.amplitude, ""
+    if here.wear > 1.0 + SHARE_OF_RTOL * rtol:
+        # where the wear is steep, the amplitude on the safe side
+        here = below
     error = (abs(here.wear - 1.0) + here.error) * width / max(above.wear - below.wear, 1e-300)
     if above.wear > JUMP * below.wear and width <= 2.0 * SHARE_OF_RTOL * rtol * root:
         here, error = below, width

@@ -114,6 +114,8 @@ def _overrides(result: Result) -> dict[str, Any]:
     keys |= {f"scene.{key}": value for key, value in part.scene.parameters.model_dump(mode="json").items()}
     for name in (*study.kind.axes, *SOLVER_AXES):
         keys[f"axes.{name}"] = points.at(points.axis(name), shown)
+    if study.allowable:
+        keys["axes.excitation_amplitude"] = float(result.at("allowable_amplitude", shown).values)
     if part.axes.frequency_ratio is not None:
         keys |= {"axes.frequency": None, "axes.frequency_ratio": keys["axes.frequency"]}
     if result.followed:

@@ -1,5 +1,6 @@
 """Rules between the tables of a study, which are right themselves. Each yields what breaks it."""
 
+import math
 from collections.abc import Iterator
 from typing import Any, cast, get_args
 
@@ -7,7 +8,7 @@ from solver.settings import FIRST_HARMONICS
 from studyrunner.kinds.table import KINDS
 from studyrunner.scatter import OF_PAIRS
 from studyrunner.study.mistakes import nearest_name
-from studyrunner.study.sections import AUTO, DEFAULT
+from studyrunner.study.sections import ALLOWABLE, AUTO, DEFAULT
 from studyrunner.study.study import Study
 from studyrunner.values import Wrong
 
@@ -18,7 +19,7 @@ def broken_rules(study: Study, first: bool) -> Iterator[Wrong]:
     """All that does not fit together. study: with its axes, without variants, and before it is complete. first: whether
     it is the first of the variants, which have the same axes.
     """
-    of_all = (_keys, study.kind.part("rules").broken_rules, _frequency) if first else ()
+    of_all = (_keys, study.kind.part("rules").broken_rules, _frequency, _amplitude) if first else ()
     for rule in (*of_all, _outputs, _solver_and_end, _scatter):
         yield from rule(study)
 
@@ -49,6 +50,25 @@ def _frequency(study: Study) -> Iterator[Wrong]:
     if word is not None and (is_fixed or len(frequency) > 1):
         remedy = f'give Hz: "{word}" stands alone, and goes with no mission, no sweep "ramp" and no scheme "final"'
         yield Wrong("axes.frequency", frequency, remedy)
+
+
+def _amplitude(study: Study) -> Iterator[Wrong]:
+    """An amplitude that is sought has a target to meet after the last cycle."""
+    amplitude, until = cast("tuple[Any, ...]", study.axes.excitation_amplitude), study.slow_time.until or {}
+    if ALLOWABLE not in amplitude:
+        return
+    if len(amplitude) > 1 or study.kind is not KINDS["wear"] or "final" in study.axes.scheme:
+        remedy = f'give N: "{ALLOWABLE}" stands alone, in a study of wear histories without the scheme "final"'
+        yield Wrong("axes.excitation_amplitude", amplitude, remedy)
+    if not {"wear_depth", "worn_volume"} & {*until}:
+        remedy = f"give a wear_depth, m, or a worn_volume, m3, that the {ALLOWABLE} excitation meets after all cycles"
+        yield Wrong("slow_time.until", until or None, remedy)
+    if not 0.0 < study.slow_time.cycles < math.inf:
+        yield Wrong("slow_time.cycles", study.slow_time.cycles, "give the number of cycles after which until is met")
+    if 0.0 in study.axes.wear_coefficient:
+        yield Wrong("axes.wear_coefficient", 0.0, f"give numbers above 0: with 0 every excitation is {ALLOWABLE}")
+    if study.scatter is not None and "excitation_amplitude" in study.scatter.inputs:
+        yield Wrong("scatter.excitation_amplitude", None, "leave it out: the amplitude of each sample is sought")
 
 
 def _outputs(study: Study) -> Iterator[Wrong]:

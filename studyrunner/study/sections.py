@@ -18,6 +18,9 @@ IDLE_FREQUENCY = 1.0
 AUTO: Final = "auto"
 """In place of a number of harmonics or samples: as many as each state needs for `rtol`."""
 
+ALLOWABLE: Final = "allowable"
+"""In place of excitation amplitudes."""
+
 DEFAULT: Final = "default"
 """In a list of variables: those that cost little, which is what a study without such a list asks for."""
 
@@ -47,8 +50,9 @@ _Knots = Annotated[Listed[float], Field(min_length=1, max_length=_MOST_KNOTS), A
 
 if TYPE_CHECKING:
     _Frequencies = tuple[float, ...]  # of a complete study
+    _Amplitudes = tuple[float, ...]
 else:
-    _Frequencies = Axis[Positive | Followed] | None
+    _Frequencies, _Amplitudes = Axis[Positive | Followed] | None, Axis[Positive | Literal["allowable"]]
 
 
 class StudySection(Section):
@@ -72,7 +76,11 @@ class AxesSection(Section):
     wear_coefficient: Axis[NotNegative] = Field(
         (1.1e-11,), description="1/Pa, of the law of [wear]; Ti-6Al-4V with friction 0.5 has 2e-13"
     )
-    excitation_amplitude: Axis[Positive] = Field((1.0,), description="N, factor of the harmonic load of the scene")
+    excitation_amplitude: _Amplitudes = Field(
+        (1.0,),
+        description="N, factor of the harmonic load of the scene; with the word the one at which the wear just meets"
+        " slow_time.until after all cycles is found",
+    )
     step: Axis[Positive] = Field((1000.0,), description="h, cycles: length of implicit and explicit steps")
     scheme: Axis[_Scheme] = Field(("adaptive",), description="how wear is integrated over the cycles")
     sweep: Axis[Literal["up", "down", "ramp"]] = Field(

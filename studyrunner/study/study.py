@@ -11,7 +11,7 @@ from pydantic import Field, InstanceOf
 from solver.settings import TARGETS, FollowedFrequency, WearTarget
 from studyrunner.coordinates import POINT, SAMPLE, SCENE
 from studyrunner.kinds.kind import Kind
-from studyrunner.kinds.wear.kind import COUNTS, LOOPS
+from studyrunner.kinds.wear.kind import ALLOWED, COUNTS, LOOPS
 from studyrunner.scatter import ScatterSection
 from studyrunner.study import sections
 from studyrunner.study.design import Design
@@ -28,6 +28,7 @@ class Study(Section):
     - kind: which kind of study this is. tables: what marks it, by name, as `mission`.
     - block_studies: for each block a study of this block alone.
     - follow: what the frequency of the excitation follows; None where it is given.
+    - allowable: whether the excitation amplitude is sought at which each point just meets its target.
     - source, folder: file of the study as the user named it, and its folder.
     - archived: attributes of a result file; None for a study file.
     - solver_axes: keys of [solver] that are given under [axes].
@@ -49,6 +50,7 @@ class Study(Section):
     kind: InstanceOf[Kind] = Field(exclude=True)
     block_studies: tuple["Study", ...] = Field((), exclude=True)
     follow: FollowedFrequency | None = Field(None, exclude=True)
+    allowable: bool = Field(False, exclude=True)
     source: str = Field(exclude=True)
     folder: Path = Field(exclude=True)
     archived: Archived | None = Field(None, exclude=True)
@@ -66,7 +68,8 @@ class Study(Section):
     def recorded(self) -> Mapping[str, Variable]:
         """Variables of its points, beside those that every result holds."""
         asked = {name: entry for name, entry in self.kind.asked.items() if name in self.outputs.variables}
-        return asked | (LOOPS if self.outputs.loops else {}) | (COUNTS if self.to_the_end else {})
+        more = (LOOPS, self.outputs.loops), (COUNTS, self.to_the_end), (ALLOWED, self.allowable)
+        return asked | {name: entry for table, is_there in more if is_there for name, entry in table.items()}
 
     @property
     def scene_variables(self) -> tuple[str, ...]:
@@ -143,5 +146,6 @@ class Study(Section):
         """Names of the axes that are neither keys of [scene] or [wear] nor samples."""
         # those of which every block of a mission gives a value of its own are none
         idle = [name for name in self.kind.axes if self.mission and all(block.gives(name) for block in self.mission)]
+        idle += ["excitation_amplitude"] if self.allowable else []
         several = [key for key in sections.SOLVER_AXES if key in self.solver_axes or len(getattr(self.solver, key)) > 1]
         return (*(name for name in self.kind.axes if name not in idle), *several)

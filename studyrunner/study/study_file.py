@@ -188,6 +188,9 @@ def _complete(study: Study) -> Study:
         low, high = study.loading.between
         update["follow"] = FollowedFrequency(cast("Followed", frequency[0]), low, high)
         frequency = (0.5 * low + 0.5 * high,)
+    amplitude: tuple[Any, ...] = axes.excitation_amplitude
+    if amplitude == (sections.ALLOWABLE,):
+        update["allowable"], amplitude = True, (1.0,)
     if sections.DEFAULT in names:
         names |= {*(kind.usual if study.scatter is None else kind.of_samples)}
         names |= {*(FOLLOWED_FREQUENCY if study.loading is not None else ())}
@@ -196,7 +199,10 @@ def _complete(study: Study) -> Study:
         names |= {"worn_volume", "worn_volume_error", "wear_depth_max", "wear_depth_max_error"}
     known = dict.fromkeys((*KINDS["wear"].asked, *SCENE, *kind.asked))
     outputs = study.outputs.model_copy(update={"variables": tuple(name for name in known if name in names)})
-    update |= {"axes": axes.model_copy(update={"frequency": frequency}), "outputs": outputs}
+    update |= {
+        "axes": axes.model_copy(update={"frequency": frequency, "excitation_amplitude": amplitude}),
+        "outputs": outputs,
+    }
     update |= {"slow_time": sections.SlowTimeSection(cycles=0.0)} if not kind.counted else {}
     update["block_studies"] = tuple(each.model_copy(update={"outputs": outputs}) for each in study.block_studies)
     return with_room_for_wear(study.model_copy(update=update))
@@ -217,6 +223,8 @@ def format_study(study: Study) -> str:
     axes = tables["axes"] = {name: values for name, values in tables["axes"].items() if name in used}
     if study.follow is not None:
         axes["frequency"] = study.follow.of
+    if study.allowable:
+        axes["excitation_amplitude"] = sections.ALLOWABLE
     for axis in study.scene_axes:
         if axis.key == ("worn",):
             continue

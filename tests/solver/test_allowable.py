@@ -8,7 +8,7 @@ import pytest
 from scipy.optimize import brentq
 
 from solver import allowable, march_wear
-from solver.allowable import Tried, allowable_amplitude, find_allowable
+from solver.allowable import BEYOND, Tried, allowable_amplitude, find_allowable
 from solver.outcome import Outcome
 from solver.settings import SolverSettings, WearTarget
 from tests.references import slider_amplitude, slider_wear_depth
@@ -34,7 +34,7 @@ def of(wear):
         failed = math.isnan(depth)
         return SimpleNamespace(
             cycles=np.array([0.0, 1.0]),
-            cycles_to_target=1.0 / wear(amplitude) if wear(amplitude) >= 1.0 else math.nan,
+            cycles_to_target=BEYOND / wear(amplitude) if wear(amplitude) >= BEYOND else math.nan,
             cycles_to_target_error=1e-3,
             wear_depth=np.array([[0.0], [depth]]),
             wear_depth_error=np.array([[0.0], [1e-3 * depth]]),

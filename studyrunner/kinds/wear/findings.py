@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import xarray as xr
@@ -24,8 +24,11 @@ _SHARE = 0.5
 
 def what_came_out(result: Result, stuck: float) -> Iterator[Finding]:
     """Wear, response, life, meshes. stuck: first frequency with the joint stuck, Hz, or NaN."""
+    sought = result.has("allowable_amplitude")
+    if sought:
+        yield _allowable(result)
     yield from _wear_and_response(result, stuck)
-    yield from filter(None, (_shortest_life(result), compare_meshes(result)))
+    yield from filter(None, (None if sought else _shortest_life(result), compare_meshes(result)))
 
 
 def errors_of(result: Result, *, wore: bool) -> tuple[str, NDArray[np.float64]] | None:
@@ -35,6 +38,34 @@ def errors_of(result: Result, *, wore: bool) -> tuple[str, NDArray[np.float64]] 
     if result.wears and has_errors and (wore or not responses):
         return "worn volume", result.errors
     return ("response", result.of_points("response_error", -1)) if responses else None
+
+
+# --- the allowable amplitude ---
+
+
+def _allowable(result: Result) -> Finding:
+    """The least amplitude at which a point meets its target; of samples, how it scatters there."""
+    until: dict[str, float] = cast("Any", result.study["slow_time"])["until"]
+    (quantity, target), *_ = until.items()
+    amplitudes, errors = (result.of_points(f"allowable_amplitude{end}") for end in ("", "_error"))
+    known = result.computed & np.isfinite(amplitudes)
+    met = f"{quantity.replace('_', ' ')} {show(target, {'wear_depth': 'm', 'worn_volume': 'm3'}[quantity])}"
+    met += f" after {show_cycles(float(result.cycles[-1]), result.counted)}"
+    values = {"target": target, "n_known": int(known.sum()), "amplitude": math.nan}
+    if not known.any():
+        return Finding("allowable", "allowable", f"no point is known to meet {met}", values)
+    point = result.largest(-np.where(known, amplitudes, np.inf))
+    amplitude, error = (float(each[result.place(point)]) for each in (amplitudes, errors))
+    text = f"{with_error(amplitude, error, 'N')} at {where_is(result, point)}: {met}"
+    text += f"; the least of {count(int(known.sum()), 'point')}" if known.sum() > 1 else ""
+    if SAMPLE in result.varying:
+        # samples that wear too little at any amplitude have inf, failed ones are left out
+        there = tuple(slice(None) if name == SAMPLE else point[name] for name in result.axes)
+        low, middle, high = np.nanquantile(amplitudes[there], [0.05, 0.5, 0.95], method="inverted_cdf")
+        text += f"; below {show(low, 'N')}, {show(middle, 'N')}, {show(high, 'N')} in 5, 50, 95 % of the samples there"
+    if not known.all():
+        text += f"; not known of {count(int((~known).sum()), 'point')}"
+    return Finding("allowable", "allowable", text, values | {"amplitude": amplitude, "error": error, "point": point})
 
 
 # --- wear and vibration ---

@@ -239,13 +239,14 @@ class History(_FromRest):
         needed: dict[Integrated, list[int]] = {}
         for place in self.places:
             needed.setdefault(self.results[place][0], []).append(place)
-        model, asked = self.joint.model(models), [self._asked(each) for each in needed]
+        model, asked = self.joint.model(models), [self.asked(each, self.until) for each in needed]
         histories = integrate_together(model, self.settings, unpack(self.start), asked, keep, self.resume)
         for (each, places), history in zip(needed.items(), histories, strict=True):
             for place in places:
                 yield replace(build_result(self, each, history, self.results[place][1]), place=place)
 
-    def _asked(self, integrated: Integrated) -> "WearRequest":
+    def asked(self, integrated: Integrated, until: WearTarget | None) -> "WearRequest":
+        """What the solver is asked for. until: wear at which the history ends."""
         from solver.wear.wearing_joint import WearRequest, steps_of
 
         counts: NDArray[np.float64] | ToTheEnd
@@ -260,7 +261,7 @@ class History(_FromRest):
             steps_of(integrated.scheme, integrated.step, integrated.largest_depth),
             counts,
             law=self.law,
-            until=self.until,
+            until=until,
             loops=self.loops,
             follow=self.excitation.follow,
         )

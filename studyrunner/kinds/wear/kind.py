@@ -88,6 +88,17 @@ LOOPS = {
 COUNTS = {"cycle_count": Variable(_CYCLE, "1", "number of vibration cycles of the output", "inf: the final state.")}
 """That of a study to the end, slow_time.cycles = inf, whose coordinate cycle is the number of the output."""
 
+ALLOWED = {
+    "allowable_amplitude": Variable(
+        (),
+        "N",
+        "excitation amplitude at which the wear meets slow_time.until after the last cycle",
+        "The values of the point are those of its history. inf: none that was tried wears so much.",
+    ),
+    "allowable_amplitude_error": Variable((), "N", "estimated error of allowable_amplitude"),
+}
+"""Those of a study with axes.excitation_amplitude = "allowable"."""
+
 OWN_STEPS = ("adaptive", "final")
 """Schemes that choose their steps, without `step`: for another wear coefficient the same ones at other counts."""
 
@@ -145,7 +156,7 @@ WEAR = Kind(
     reads={"slow_time": ("cycles", "final_share", "outputs", "until", "largest_depth")},
     asked=ASKED,
     always=OF_A_HISTORY,
-    more=LOOPS | COUNTS,
+    more=LOOPS | COUNTS | ALLOWED,
     usual=USUAL,
     of_samples=OF_SAMPLES,
     scene=("mesh", "natural_frequency", "exact"),

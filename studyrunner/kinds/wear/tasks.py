@@ -19,8 +19,9 @@ from solver.contact.wear_law import WearLaw
 from solver.settings import ToTheEnd
 from studyrunner.kinds.estimate import iterations_of_sweep, seconds_of
 from studyrunner.kinds.task import EQUAL_POINTS, TaskPlan, Work, n_unknowns_of
+from studyrunner.kinds.wear.allowable import HISTORIES_OF_SEARCH, AllowableAmplitude
 from studyrunner.kinds.wear.histories import Excitation, History, Integrated, Sweep
-from studyrunner.kinds.wear.kind import OWN_STEPS
+from studyrunner.kinds.wear.kind import ALLOWED, OWN_STEPS
 from studyrunner.points.table import Points
 from studyrunner.study.study import Study
 from studyrunner.system.progress import count
@@ -107,6 +108,10 @@ def build_tasks(study: Study, points: Points, n_displacements: Sequence[int]) ->
     }
     sharing: _Sharing = lru_cache(_MOST_KNOWN)(partial(_share_histories, study))
     sweeps, groups = _find_starts(study, points, n_displacements)
+    if study.allowable:
+        searches = list(_searches(study, groups, outputs))
+        works = [search.work for search in searches]
+        return TaskPlan(partial(iter, searches), works, {}, points.n)
     causes, n_tasks, n_integrated, n_unknowns, seconds, longest = Counter[str](), 0, 0, 0, 0.0, 0.0
     for sweep, *_, values in groups():
         tasks, shared = sharing(values)
@@ -190,6 +195,38 @@ def _make_histories(
             )
 
 
+def _searches(
+    study: Study, groups: Callable[[], Iterator[_Group]], outputs: Mapping[str, Any]
+) -> Iterator[AllowableAmplitude]:
+    """The searches for allowable amplitudes, one for equal points, each with all histories that it takes."""
+    number, depth = itertools.count(), study.slow_time.largest_depth
+    outputs = {**outputs, "variables": tuple(name for name in study.recorded if name not in ALLOWED)}
+    for sweep, position, law, numbers, values in groups():
+        for value in dict.fromkeys(values):
+            same = [place for place, each in zip(numbers.tolist(), values, strict=True) if each == value]
+            largest = depth if value.scheme == "explicit" else None
+            integrated = Integrated(value.scheme, value.step, largest, (value.wear_coefficient,), unworn=False)
+            iterations = _iterations([(value.scheme, value.step)], study.output_counts[-1])
+            cost = HISTORIES_OF_SEARCH * (sweep.cost * sweep.first_share + seconds_of(sweep.n_unknowns, iterations))
+            history = History(
+                number=next(number),
+                scenes=sweep.scenes,
+                settings=sweep.settings,
+                cost=cost,
+                n_unknowns=sweep.n_unknowns,
+                indices=(tuple(same),),
+                joint=sweep.joint,
+                excitation=sweep.excitation,
+                law=law,
+                sweep=sweep.number,
+                position=position,
+                frequency=sweep.frequencies[position],
+                integrated=(integrated,),
+                **outputs,
+            )
+            yield AllowableAmplitude.of(history)
+
+
 def _share_histories(study: Study, points: Sequence[_Values]) -> tuple[tuple[_Together, ...], Counter[str]]:
     """The tasks from a start state, and how many points are not computed alone, by reason; with `shortcuts = false`
     only equal points share a history.
@@ -257,6 +294,7 @@ WAYS = {
     "sweep": lambda n_tasks, n_results: f"{count(n_results, 'start state')} by {count(n_tasks, 'sweep')}",
     "ramp": lambda n_tasks, n_results: f"{count(n_results, 'start state')} by {count(n_tasks, 'ramp')}",
     "history": lambda _, n_results: count(n_results, "wear history", "wear histories"),
+    "search": lambda _, n_results: count(n_results, "search for an amplitude", "searches for an amplitude"),
 }
 
 
@@ -266,6 +304,10 @@ def plan_rows(study: Study) -> Iterator[tuple[str, str]]:
     if study.follow is not None:
         what = f"{study.follow.of}, found between {study.follow.low:g} and {study.follow.high:g} Hz by the sweep"
         yield "frequency", what if end == 0.0 else f"{what} and followed while the joint wears"
+    if study.allowable:
+        (quantity, value), *_ = (study.slow_time.until or {}).items()
+        met = f"the one with which {quantity} is {value:g} after {end:g} cycles"
+        yield "amplitude", f"{met}, found by about {HISTORIES_OF_SEARCH} histories"
     if study.to_the_end:
         until = f"until the wear rate of every pair is below {study.slow_time.final_share:g} of its largest"
         yield "cycles", f"{until}; {n_stored} states are stored, spaced evenly in worn volume and cycles"

@@ -1,0 +1,76 @@
+"""Task of wear: the excitation amplitude at which a history just meets its target after the last cycle."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, cast
+
+import numpy as np
+
+from solver.model import ReducedModel
+from solver.packing import Keep, pack, unpack
+from solver.settings import Direction
+from studyrunner.kinds.task import Identity, PointResult, Task, digest
+from studyrunner.kinds.wear.histories import History, build_result
+
+if TYPE_CHECKING:
+    from solver.results.history import WearHistory
+
+HISTORIES_OF_SEARCH = 8
+"""Histories of a search. Dovetail, slider: 5 to 14, of which several do not wear, or end early."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class AllowableAmplitude(Task):
+    """The search of one point, with sweeps of its own: each amplitude has another start state.
+
+    history: that of the point, whose excitation has any amplitude, and whose target is the one to meet.
+    """
+
+    history: History
+
+    way = "search"
+
+    @classmethod
+    def of(cls, history: History) -> "AllowableAmplitude":
+        """The search of a history with one result."""
+        names = ("number", "scenes", "settings", "cost", "n_unknowns", "variables", "indices")
+        shared: dict[str, Any] = {name: getattr(history, name) for name in names}
+        return cls(**shared, history=history)
+
+    def hashes(self, identity: Identity) -> tuple[str, ...]:
+        """Hash of all that decides the history but its amplitude."""
+        return tuple(digest("allowable", name) for name in self.history.hashes(identity))
+
+    def compute(self, models: Mapping[int, ReducedModel], keep: Keep) -> Iterator[PointResult]:
+        """The history at the amplitude that is found; what was tried is kept."""
+        # numba is loaded where a task runs, so that --plan and --help do without it
+        from solver.allowable import find_allowable, stopping_at
+        from solver.loading_history.start_states import FrequencySweep
+        from solver.wear.history import integrate_together
+
+        history, (integrated,) = self.history, self.history.integrated
+        model, excitation, until = history.joint.model(models), history.excitation, history.until
+        assert until is not None
+        direction = cast("Direction", excitation.direction)
+        asked = history.asked(integrated, stopping_at(until))
+        frequencies = excitation.follow or np.array([history.frequency])
+
+        def history_at(amplitude: float) -> "WearHistory":
+            def say(said: object) -> None:
+                if isinstance(said, str):
+                    keep(f"{amplitude:.3g} N: {said}")
+
+            sweeps = FrequencySweep(model, amplitude, direction, self.settings, say)
+            _, start = next(sweeps.states(frequencies))
+            return next(integrate_together(model, self.settings, start, [asked], say))
+
+        known = () if self.resume is None else unpack(self.resume)
+        found = find_allowable(history_at, until, self.settings.rtol, known, lambda tried: keep(pack(tried)))
+        result = build_result(history, integrated, found.history)
+        own: dict[str, Any] = {"allowable_amplitude": found.amplitude, "allowable_amplitude_error": found.error}
+        own |= {"outcome": int(found.outcome), "message": found.message}
+        yield PointResult({**result.values, **own})
+
+    def describe(self, place: int) -> str:  # noqa: ARG002
+        """Its frequency and scheme."""
+        return f"allowable amplitude at {self.history.describe(0)}"

@@ -1,0 +1,62 @@
+"""The excitation at which wear just meets its target, from the study file to the end of a run."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from solver import SolverSettings, WearTarget, allowable_amplitude
+from studies import build_scene
+from studyrunner.study.study_file import read_study
+from studyrunner.summary.answer import summary
+from studyrunner.worn_joint import compute_worn_joint
+from tests.studyrunner.fakes import plan_of
+from tests.studyrunner.small_studies import compute, same_values
+
+pytestmark = [pytest.mark.usefixtures("folder"), pytest.mark.slow]
+
+SOUGHT = ("axes.excitation_amplitude=allowable", "slow_time.until={wear_depth=5e-5}", "slow_time.cycles=8e5")
+ASKED = (*SOUGHT, "axes.scheme=adaptive", "axes.frequency=[150, 160]", "slow_time.outputs=5")
+
+
+def test_each_point_has_its_amplitude():
+    found = compute("sdof_slider", "out.nc", *ASKED)
+    amplitude, error = found.allowable_amplitude.squeeze(), found.allowable_amplitude_error.squeeze()
+    assert "excitation_amplitude" not in found.dims
+    for frequency, at in zip((150.0, 160.0), amplitude.values, strict=True):
+        alone = allowable_amplitude(
+            build_scene("sdof_slider"), frequency, 0.5, 1.1e-11, 8e5, WearTarget("wear_depth", 5e-5)
+        )
+        assert abs(alone.amplitude - at) < alone.error + float(error.sel(frequency=frequency))
+    # the history of a point is that at its amplitude, with values at all counts
+    depth = found.wear_depth.isel(cycle=-1).values.ravel()
+    assert ((depth > 0.95 * 5e-5) & (depth < 1.01 * 5e-5)).all()
+    given = compute("sdof_slider", "given.nc", "axes.scheme=adaptive", "axes.frequency=150", "slow_time.cycles=8e5",
+                    f"axes.excitation_amplitude={float(amplitude[0])!r}", "slow_time.outputs=5")  # fmt: skip
+    np.testing.assert_array_equal(
+        given.worn_volume.values.ravel(), found.worn_volume.sel(frequency=150.0).values.ravel()
+    )
+    told = summary(found)
+    assert told.values["allowable"]["amplitude"] == float(amplitude.min())
+    assert "life" not in told.values
+
+
+def test_a_result_runs_again_and_its_worn_joint_has_its_amplitude(tmp_path):
+    found = compute("sdof_slider", "out.nc", *ASKED)
+    same_values(compute("out.nc", "again.nc"), found)
+    curve = compute_worn_joint(Path("out.nc"), tmp_path, response=True)["response"]
+    assert np.isfinite(curve.response_amplitude).all()
+
+
+def test_samples_have_amplitudes_of_their_own():
+    drawn = ("scatter.samples=3", "scatter.friction_coefficient={normal = {std = 0.05}}", "axes.frequency=160")
+    found = compute("sdof_slider", "out.nc", *ASKED[:-2], *drawn, "slow_time.outputs=2")
+    assert len(np.unique(found.allowable_amplitude)) == 3
+    assert "in 5, 50, 95 % of the samples" in " ".join(str(summary(found)).split())
+
+
+def test_each_search_is_a_task():
+    study = read_study("sdof_slider", (*ASKED, "axes.wear_coefficient=[1e-11, 2e-11]", "axes.step=[1, 2]"))
+    plan = plan_of(study)
+    assert (len(plan.results), plan.sweeps) == (4 + 4, ())
+    assert SolverSettings().rtol == study.solver.rtol[0]
