@@ -53,8 +53,9 @@ WRONG = {
         solver.harmonics=auto ; solver.samples=4
         slow_time.outputs=[0, 10]
         slow_time.until={{hours = 1}}
-        axes.excitation_amplitude=allowable -> slow_time.until
-        axes.excitation_amplitude=[1.0, 'allowable'] ; slow_time.until={{wear_depth=1e-5}} -> axes.excitation_amplitude
+        axes.excitation_amplitude=allowable -> slow_time.until, slow_time.cycles
+        axes.excitation_amplitude=[1.0, 'allowable'] ; slow_time.until={{wear_depth=1e-5}} \
+            -> axes.excitation_amplitude, slow_time.cycles
         axes.excitation_amplitude=allowable ; slow_time={{cycles=inf, until={{wear_depth=1e-5}}}} -> slow_time.cycles
         wear.law=threshold -> wear.threshold
         wear={{law='table', pressure=[0], depth=[0], factor=[[1]]}} ; scene.worn={{depth=1e-6}} -> wear.law
