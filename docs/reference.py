@@ -19,7 +19,7 @@ from studyrunner.coordinates import COORDINATES, OF_SCENE, SCENE
 from studyrunner.kinds.table import KINDS
 from studyrunner.report.contents import all_figures
 from studyrunner.study.keys import key_list
-from studyrunner.summary.answer import ADVICE
+from studyrunner.summary.answer import ADVICE, OF_GIVEN_NUMBERS
 from studyrunner.variables import Variable
 
 HEAD = """# Reference
@@ -41,7 +41,15 @@ def reference() -> str:
         "Coordinates": _variables(COORDINATES),
         "Outcomes": _table(
             ("number", "outcome", "meaning", "what to do"),
-            ((f"{int(each)}", f"`{each}`", each.sentence, ADVICE.get(each, "")) for each in Outcome),
+            (
+                (
+                    f"{int(each)}",
+                    f"`{each}`",
+                    each.sentence,
+                    ". ".join(filter(None, (ADVICE.get(each), OF_GIVEN_NUMBERS.get(each)))),
+                )
+                for each in Outcome
+            ),
         ),
         "Figures of a report": _table(
             ("file", "shows", "how to read it"),

@@ -194,6 +194,7 @@ def _complete(study: Study) -> Study:
     if sections.DEFAULT in names:
         names |= {*(kind.usual if study.scatter is None else kind.of_samples)}
         names |= {*(FOLLOWED_FREQUENCY if study.loading is not None else ())}
+        names |= {"friction_power"} & {*kind.asked} if study.wear.law == "power" else set()
         names |= {"mesh"} & {*study.scene.offers}
     if study.scatter is not None and study.scatter.given_limits:
         names |= {"worn_volume", "worn_volume_error", "wear_depth_max", "wear_depth_max_error"}

@@ -6,7 +6,7 @@ import textwrap
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import xarray as xr
@@ -36,7 +36,6 @@ _WIDTH, _LONGEST = 12, 240
 _NUMBER = re.compile(r"(?<=\d) (?=\S)")
 _PLAIN = str.maketrans({"±": "+-", "³": "3", "²": "2", "µ": "u", "√": " sqrt ", "\N{NO-BREAK SPACE}": " "})
 
-_AUTOMATIC = '"auto" in place of numbers of harmonics and samples'
 ADVICE = {
     Outcome.TIME_LIMIT: "--retry-failed continues with a larger solver.time_limit",
     Outcome.RESONANCE_LOST: "Try another range in loading.between, or another axes.sweep",
@@ -44,10 +43,18 @@ ADVICE = {
     Outcome.STEP_TOO_LONG: 'Try scheme = "adaptive", or a smaller step',
     Outcome.SENSITIVE: "[scatter] shows how far the worn volume scatters",
     Outcome.NO_FINAL_STATE: "Try an end in slow_time.cycles or slow_time.until",
-    **dict.fromkeys((Outcome.START_FAILED, Outcome.BRANCH_LOST), f"Try another axes.sweep, or {_AUTOMATIC}"),
-    **dict.fromkeys((Outcome.INACCURATE, Outcome.CERTIFICATE_FAILED), f"Try {_AUTOMATIC}"),
+    **dict.fromkeys((Outcome.START_FAILED, Outcome.BRANCH_LOST), "Try another axes.sweep"),
 }
 """What may help, by outcome."""
+
+OF_GIVEN_NUMBERS = dict.fromkeys(
+    (Outcome.START_FAILED, Outcome.BRANCH_LOST, Outcome.INACCURATE, Outcome.CERTIFICATE_FAILED),
+    'Try "auto" in place of numbers of harmonics and samples',
+)
+"""What may help where harmonics and samples are numbers."""
+
+_IN_SHORT = {Outcome.INACCURATE: "not all is known within rtol"}
+"""What has happened, where the first of the points says it in detail."""
 
 
 @dataclass(frozen=True)
@@ -110,6 +117,8 @@ def _failures(result: Result) -> Iterator[Finding]:
     Those that failed come before those that are uncertain only; of many ways the last are counted.
     """
     numbers, counts = np.unique(result.dataset["outcome"].values, return_counts=True)
+    tables = [cast("dict[str, Any]", result.study.get(name, {})) for name in ("solver", "axes")]
+    given = any(table.get(key, "auto") != "auto" for table in tables for key in ("harmonics", "samples"))
     findings = []
     for number, n_points in zip(numbers.tolist(), counts.tolist(), strict=True):
         if number == Outcome.CONVERGED:
@@ -120,7 +129,8 @@ def _failures(result: Result) -> Iterator[Finding]:
         is_silent = not result.has("message") or (number == Outcome.SENSITIVE and np.isfinite(result.errors[place]))
         reason = "" if is_silent else str(result.dataset["message"].values[place])
         reason = f"{reason[:_LONGEST].rsplit(' ', 1)[0]} ..." if len(reason) > _LONGEST else reason
-        advice, first = ADVICE.get(number, ""), reason[:1].upper() + reason[1:]
+        advice = ". ".join(filter(None, (ADVICE.get(number), OF_GIVEN_NUMBERS.get(number) if given else "")))
+        first, happened = reason[:1].upper() + reason[1:], _IN_SHORT.get(number, happened) if reason else happened
         if result.varying:
             first = f"First: {': '.join(filter(None, (where_is(result, result.point_at(place)), reason)))}"
         of = f"{n_points} of {count(result.computed.size, 'point')}: " if result.computed.size > 1 else ""

@@ -171,6 +171,20 @@ def test_where_a_followed_resonance_went():
     assert [told in " ".join(str(summary(each)).split()) for each in (made, given)] == [False, True]
 
 
+@pytest.mark.parametrize(("power", "word"), [(1e3, "below"), (8e3, "within"), (5e5, "beyond")])
+def test_the_power_of_friction_stands_beside_that_of_the_tests(power, word):
+    law = ("wear.law=power", "wear.adhesive=1e-13", "wear.decay=1e-5")
+    made = wearing("axes.frequency=1", *law, friction_power=lambda _: np.full((21, 1), power))
+    assert f" kW/m2, {word} the 2 to 430 " in " ".join(str(summary(made)).split())
+    assert "power" not in summary(wearing("axes.frequency=1")).values
+
+
+@pytest.mark.parametrize(("given", "is_said"), [((), False), (("solver.harmonics=5", "solver.samples=64"), True)])
+def test_automatic_harmonics_are_advised_where_numbers_are_given(given, is_said):
+    made = wearing("axes.frequency=1", *given, outcome=lambda _: Outcome.INACCURATE)
+    assert ('"auto"' in str(summary(made))) is is_said
+
+
 @pytest.mark.parametrize(("coefficient", "is_said"), [(1.1e-11, True), (4e-13, False)])
 def test_a_coefficient_that_metals_do_not_have_is_said(coefficient, is_said):
     found = summary(wearing("axes.frequency=1", f"axes.wear_coefficient={coefficient}")).values

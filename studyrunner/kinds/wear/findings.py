@@ -18,6 +18,9 @@ from studyrunner.system.progress import count
 from studyrunner.units import show_cycles, show_known, show_number, show_percent
 
 _MOST_ALIKE = 3
+MEASURED_POWER = (2e3, 4.3e5)
+"""Power densities of friction, W/m2, of the tests of the law "power" (Fouvry and others 2017)."""
+
 _SHARE = 0.5
 """Of the wear of a surface that lies at its edge: more, and more than its share of the area, is pointed out."""
 
@@ -28,7 +31,20 @@ def what_came_out(result: Result, stuck: float) -> Iterator[Finding]:
     if sought:
         yield _allowable(result)
     yield from _wear_and_response(result, stuck)
-    yield from filter(None, (None if sought else _shortest_life(result), compare_meshes(result)))
+    yield from filter(None, (None if sought else _shortest_life(result), compare_meshes(result), _power(result)))
+
+
+def _power(result: Result) -> Finding | None:
+    """The largest power density of friction, beside those at which the law "power" was measured; None of other laws."""
+    wear = cast("dict[str, Any]", result.study.get("wear", {}))
+    if wear.get("law") != "power" or not result.has("friction_power"):
+        return None
+    of_points = result.over_points("friction_power", lambda values: np.nan_to_num(values).max(axis=-1))
+    largest, (low, high) = float(of_points.max(initial=0.0)), MEASURED_POWER
+    within = "within" if low <= largest <= high else "beyond" if largest > high else "below"
+    text = f"friction has up to {largest / 1e3:.3g} kW/m2, {within} the {low / 1e3:g} to {high / 1e3:g} kW/m2 of the"
+    text += " tests of this law"
+    return Finding("power", "power", text, {"largest": largest, "is_measured": within == "within"})
 
 
 def errors_of(result: Result, *, wore: bool) -> tuple[str, NDArray[np.float64]] | None:

@@ -30,6 +30,7 @@ ASKED = {
         _CYCLE, "Hz", "estimated error of excitation_frequency", "0 for a given frequency."
     ),
     "slip_range": Variable(_PAIRS, "m", "range of the slip over a period", "Largest distance of two places."),
+    "friction_power": Variable(_PAIRS, "W/m2", "power density of friction", "Mean over a period, on contact_area."),
     "open_fraction": Variable(_PAIRS, "1", "fraction of the period in which the pair is open"),
     "friction_use": Variable(
         _CYCLE, "1", "largest friction force over its limit", "Of any pair, at any time; 1 where one slips."
@@ -68,7 +69,7 @@ FOLLOWED_FREQUENCY = ("excitation_frequency", "excitation_frequency_error")
 """Further ones of a study that names none and whose frequency follows the resonance."""
 
 OF_SAMPLES_ALONE = ("wear_depth_max", "wear_depth_max_error", "wear_depth_last")
-USUAL = tuple(name for name in ASKED if name not in (*OF_SAMPLES_ALONE, *FOLLOWED_FREQUENCY))
+USUAL = tuple(name for name in ASKED if name not in (*OF_SAMPLES_ALONE, *FOLLOWED_FREQUENCY, "friction_power"))
 """Those of other studies that name none."""
 
 LOOPS = {
