@@ -247,12 +247,16 @@ class Result:
 
     @cached_property
     def shown(self) -> dict[str, int]:
-        """The point that figures of a single point show: of `best_known` the one with the largest final worn volume.
+        """The point that figures of a single point show: of `best_known` the one with the largest final worn volume, or
+        the least allowable amplitude.
 
         Where nothing is worn the one with the largest response at first. Other points count only where there is none.
         """
         everywhere = has_slow_time = np.ones(self.computed.shape, np.bool_)
         measures = [self.of_points(name) for name in self.kind.last_axes]
+        if self.has("allowable_amplitude"):
+            # the least one is that of all
+            measures.append(1.0 / self.of_points("allowable_amplitude"))
         if self.kind.counted and self.has("worn_volume"):
             measures.append(self.worn)
         if self.kind.counted and self.has("response_amplitude"):

@@ -26,7 +26,7 @@ _NEW: dict[str, Given] = {
     },
     "axes": {
         "frequency": ({"start": 211.5, "stop": 213.5, "num": 5}, "Hz; the joint resonates near 212.6 Hz"),
-        "wear_coefficient": (1.1e-11, "1/Pa; 28 times that of Ti-6Al-4V, so that few cycles show wear: give your own"),
+        "wear_coefficient": (1.1e-11, "1/Pa; 55 times that of Ti-6Al-4V, so that few cycles show wear: give your own"),
         "excitation_amplitude": (0.5, "N; every axis is a number, a list or {start, stop, num}"),
     },
     "slow_time": {"cycles": (20_000, "of vibration"), "outputs": (21, "cycle counts in the result")},

@@ -7,6 +7,8 @@ import pytest
 
 from solver import SolverSettings, WearTarget, allowable_amplitude
 from studies import build_scene
+from studyrunner.report.figures.points import draw_trends
+from studyrunner.result.view import open_for_report
 from studyrunner.study.study_file import read_study
 from studyrunner.summary.answer import summary
 from studyrunner.worn_joint import compute_worn_joint
@@ -19,7 +21,11 @@ SOUGHT = ("axes.excitation_amplitude=allowable", "slow_time.until={wear_depth=5e
 ASKED = (*SOUGHT, "axes.scheme=adaptive", "axes.frequency=[150, 160]", "slow_time.outputs=5")
 
 
-def test_each_point_has_its_amplitude():
+def told(found):
+    return " ".join(str(summary(found)).split())
+
+
+def test_each_point_has_its_amplitude(tmp_path):
     found = compute("sdof_slider", "out.nc", *ASKED)
     amplitude, error = found.allowable_amplitude.squeeze(), found.allowable_amplitude_error.squeeze()
     assert "excitation_amplitude" not in found.dims
@@ -36,13 +42,13 @@ def test_each_point_has_its_amplitude():
     np.testing.assert_array_equal(
         given.worn_volume.values.ravel(), found.worn_volume.sel(frequency=150.0).values.ravel()
     )
-    told = summary(found)
-    assert told.values["allowable"]["amplitude"] == float(amplitude.min())
-    assert "life" not in told.values
-
-
-def test_a_result_runs_again_and_its_worn_joint_has_its_amplitude(tmp_path):
-    found = compute("sdof_slider", "out.nc", *ASKED)
+    values = summary(found).values
+    assert values["allowable"]["amplitude"] == float(amplitude.min())
+    assert not {"life", "wear"} & {*values}
+    shown = open_for_report(Path("out.nc"))
+    assert shown.shown["frequency"] == int(np.argmin(amplitude.values))
+    assert draw_trends(shown) is not None
+    # a result runs again, and its worn joint is excited as it was
     same_values(compute("out.nc", "again.nc"), found)
     curve = compute_worn_joint(Path("out.nc"), tmp_path, response=True)["response"]
     assert np.isfinite(curve.response_amplitude).all()
@@ -52,7 +58,11 @@ def test_samples_have_amplitudes_of_their_own():
     drawn = ("scatter.samples=3", "scatter.friction_coefficient={normal = {std = 0.05}}", "axes.frequency=160")
     found = compute("sdof_slider", "out.nc", *ASKED[:-2], *drawn, "slow_time.outputs=2")
     assert len(np.unique(found.allowable_amplitude)) == 3
-    assert "in 5, 50, 95 % of the samples" in " ".join(str(summary(found)).split())
+    assert "3 samples are too few to say which input decides" in told(found)
+    # as if there were many: the friction that each has drawn decides
+    many = found.isel(sample=np.tile([0, 1, 2], 30))
+    assert "5, 50, 95 % of 90 samples" in told(many)
+    assert "rank correlations: friction coefficient 1.00" in told(many)
 
 
 def test_each_search_is_a_task():

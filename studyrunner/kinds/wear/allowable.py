@@ -73,4 +73,4 @@ class AllowableAmplitude(Task):
 
     def describe(self, place: int) -> str:  # noqa: ARG002
         """Its frequency and scheme."""
-        return f"allowable amplitude at {self.history.describe(0)}"
+        return f"allowable amplitude {self.number + 1} at {self.history.describe(0)}"

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from solver.outcome import SENSITIVE_ERROR, Outcome, absolute
 from studyrunner.coordinates import SAMPLE
+from studyrunner.kinds.wear.sought import find_allowable
 from studyrunner.result.pairs import contact_pairs, has_depths, last_depth
 from studyrunner.result.view import NO_MOTION, NO_VOLUME, Point, Result
 from studyrunner.statistics.sentences import describe_limit, describe_ranking, describe_volumes
@@ -29,7 +30,7 @@ def what_came_out(result: Result, stuck: float) -> Iterator[Finding]:
     """Wear, response, life, meshes. stuck: first frequency with the joint stuck, Hz, or NaN."""
     sought = result.has("allowable_amplitude")
     if sought:
-        yield _allowable(result)
+        yield find_allowable(result)
     yield from _wear_and_response(result, stuck)
     yield from filter(None, (None if sought else _shortest_life(result), compare_meshes(result), _power(result)))
 
@@ -56,34 +57,6 @@ def errors_of(result: Result, *, wore: bool) -> tuple[str, NDArray[np.float64]] 
     return ("response", result.of_points("response_error", -1)) if responses else None
 
 
-# --- the allowable amplitude ---
-
-
-def _allowable(result: Result) -> Finding:
-    """The least amplitude at which a point meets its target; of samples, how it scatters there."""
-    until: dict[str, float] = cast("Any", result.study["slow_time"])["until"]
-    (quantity, target), *_ = until.items()
-    amplitudes, errors = (result.of_points(f"allowable_amplitude{end}") for end in ("", "_error"))
-    known = result.computed & np.isfinite(amplitudes)
-    met = f"{quantity.replace('_', ' ')} {show(target, {'wear_depth': 'm', 'worn_volume': 'm3'}[quantity])}"
-    met += f" after {show_cycles(float(result.cycles[-1]), result.counted)}"
-    values = {"target": target, "n_known": int(known.sum()), "amplitude": math.nan}
-    if not known.any():
-        return Finding("allowable", "allowable", f"no point is known to meet {met}", values)
-    point = result.largest(-np.where(known, amplitudes, np.inf))
-    amplitude, error = (float(each[result.place(point)]) for each in (amplitudes, errors))
-    text = f"{with_error(amplitude, error, 'N')} at {where_is(result, point)}: {met}"
-    text += f"; the least of {count(int(known.sum()), 'point')}" if known.sum() > 1 else ""
-    if SAMPLE in result.varying:
-        # samples that wear too little at any amplitude have inf, failed ones are left out
-        there = tuple(slice(None) if name == SAMPLE else point[name] for name in result.axes)
-        low, middle, high = np.nanquantile(amplitudes[there], [0.05, 0.5, 0.95], method="inverted_cdf")
-        text += f"; below {show(low, 'N')}, {show(middle, 'N')}, {show(high, 'N')} in 5, 50, 95 % of the samples there"
-    if not known.all():
-        text += f"; not known of {count(int((~known).sum()), 'point')}"
-    return Finding("allowable", "allowable", text, values | {"amplitude": amplitude, "error": error, "point": point})
-
-
 # --- wear and vibration ---
 
 
@@ -101,8 +74,13 @@ def _wear_and_response(result: Result, stuck: float) -> Iterator[Finding]:
     if result.wears and result.has("worn_volume") and best.any():
         worn = np.where(best, result.worn, -1.0)
         wears = float(worn.max()) > NO_VOLUME
-        point = result.largest(worn) if wears else point
-        yield from _of_wear(result, point) if wears else [_nothing(result, resonance)]
+        # points that were sought all wear the same
+        sought = result.has("allowable_amplitude")
+        point = result.largest(worn) if wears and not sought else point
+        if sought and wears:
+            yield _deepest(result, point, result.last_reached(point), f" ({where_is(result, point)})")
+        else:
+            yield from _of_wear(result, point) if wears else [_nothing(result, resonance)]
     elif result.wears and result.has("worn_volume", "error_estimate") and result.computed.any():
         yield Finding("wear", "wear", "no worn volume is known within 50 %")
     yield from _of_limits(result)
@@ -229,10 +207,12 @@ def _response(result: Result, point: Point, wears: bool, resonance: str) -> Find
     amplitude = result.at("response_amplitude", point, ends).transpose("cycle", "response").values
     of = int(np.argmax(amplitude[0]))
     both = np.where(amplitude[:, of] > NO_MOTION, amplitude[:, of], 0.0)
-    wrong = result.at("response_error", point, ends).values if result.has("response_error") else np.full(2, np.nan)
+    has_errors = result.has("response_error")
+    wrong = result.at("response_error", point, ends).values if has_errors else np.full(2, np.nan)
     both = np.where((wrong > SENSITIVE_ERROR) & (both > 0.0), np.nan, both)
     errors, name = absolute(wrong, both), result.responses[of]
-    new, worn = (with_error(value, error, "m") for value, error in zip(both.tolist(), errors.tolist(), strict=True))
+    both_errors = zip(both.tolist(), errors.tolist(), strict=True)
+    new, worn = (with_error(value, error, "m") if has_errors else show(value, "m") for value, error in both_errors)
     values: dict[str, Any] = {"response": name, "amplitude": both.tolist(), "error": errors.tolist()}
     if result.followed and result.has("excitation_frequency"):
         start, end = result.at("excitation_frequency", point, ends).values.tolist()

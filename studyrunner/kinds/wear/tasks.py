@@ -306,7 +306,8 @@ def plan_rows(study: Study) -> Iterator[tuple[str, str]]:
         yield "frequency", what if end == 0.0 else f"{what} and followed while the joint wears"
     if study.allowable:
         (quantity, value), *_ = (study.slow_time.until or {}).items()
-        met = f"the one with which {quantity} is {value:g} after {end:g} cycles"
+        unit = {"wear_depth": "m", "worn_volume": "m3"}[quantity]
+        met = f"the one with which {quantity} is {value:g} {unit} after {end:g} cycles"
         yield "amplitude", f"{met}, found by about {HISTORIES_OF_SEARCH} histories"
     if study.to_the_end:
         until = f"until the wear rate of every pair is below {study.slow_time.final_share:g} of its largest"

@@ -46,12 +46,17 @@ _CONVERGED_COLOUR, _OTHERS = "#dfe7ef", (COLOURS[1], COLOURS[0], *COLOURS[2:], "
 
 
 def draw_trends(result: Result) -> Drawn:
-    """Small multiples: one row a quantity, one column an axis. Nothing where only frequency and scheme vary."""
+    """Small multiples: one row a quantity, one column an axis. Nothing where only frequency and scheme vary, unless
+    amplitudes were sought.
+    """
     quantities = [each for each in _find_quantities(result) if np.isfinite(each[2]).any()]
-    if not quantities or (all(name in _PLAIN for name in result.varying) and not result.designed):
+    sought = result.has("allowable_amplitude")
+    if not quantities or (all(name in _PLAIN for name in result.varying) and not (result.designed or sought)):
         return None
     # the last of many are the first to go
     varying = [*result.designed, *(name for name in result.varying if name not in (POINT, SAMPLE))]
+    if not varying:
+        return None
     axes, left = varying[:_MOST_AXES], [name.replace("_", " ") for name in varying[_MOST_AXES:]]
     figure, panels = plot.new_panels(len(quantities), len(axes), 0.5 + 1.35 * len(quantities), sharey="row")
     for row, (label, units, values, errors) in zip(panels, quantities, strict=True):
@@ -59,8 +64,11 @@ def draw_trends(result: Result) -> Drawn:
         for name, panel in zip(axes, row, strict=True):
             _draw_trend(panel, result, name, scale(values), scale(errors))
             panel.set_ylabel(f"{label}\n({scale.unit})")
+        # the panels of a row share their limits
+        plot.set_from_zero(row[0], 1.05 * float(np.nanmax(scale(values))))
     plot.label_outer(panels)
-    through = f"Blue: through {result.describe(result.shown)}, where most is worn; grey: all other combinations"
+    most = "the least allowable amplitude" if sought else "where most is worn"
+    through = f"Blue: through {result.describe(result.shown)}, {most}; grey: all other combinations"
     return figure, through, f"Left out: {', '.join(left)}" if left else ""
 
 
@@ -88,7 +96,10 @@ def list_points(result: Result) -> Drawn:
 def _find_quantities(result: Result) -> list[tuple[str, str, FloatArray, FloatArray]]:
     """Label, unit, values and errors (axes...) in the end of what every point has."""
     quantities = []
-    if result.has("worn_volume") and len(result.cycles) > 1:
+    if result.has("allowable_amplitude"):
+        sought, unsure = (result.of_points(f"allowable_amplitude{end}") for end in ("", "_error"))
+        quantities.append(("allowable\namplitude", "N", np.where(np.isfinite(sought), sought, np.nan), unsure))
+    elif result.has("worn_volume") and len(result.cycles) > 1:
         worn = np.where(result.computed, result.worn, np.nan)
         quantities.append(("worn volume\nin the end", "m3", worn, absolute(result.errors, worn)))
     if result.has("response_amplitude"):
@@ -114,7 +125,6 @@ def _draw_trend(panel: Axes, result: Result, name: str, values: FloatArray, erro
     look: dict[str, Any] = {"color": COLOURS[0], "marker": "o", "markersize": 3.5, "zorder": 3, "label": "shown point"}
     look |= {"linestyle": "none"} if along == POINT else {}
     plot.add_line(panel, at, drawn[through], wrong[through], **look)
-    panel.set_ylim(bottom=0.0)
     units = units_of(result.dataset[name])
     # a word a line: panels are narrow
     panel.set_xlabel(name.replace("_", "\n") + (f"\n({units})" if units else ""))
