@@ -117,7 +117,7 @@ def march_wear(
     read_at = ToTheEnd(outputs, final_share) if to_the_end else counts
     steps = steps_of(scheme, length)
     request = WearRequest(per_pressure, steps, read_at, law=law, until=until, follow=follow)
-    return next(integrate_together(model, settings, start, (request,), keep))
+    return next(integrate_together(model, settings, start, (request,), report=keep))
 
 
 def _check_frequency(
@@ -194,7 +194,7 @@ def integrate_mission(
     per_pressure = check_number("wear_coefficient", wear_coefficient, least=0.0)
     longest = largest_step and int(largest_step)
     asked = MissionRequest(checked, per_pressure, wanted, settings, law, until, sweep, longest)
-    return integrate_missions(asked, lines_to(progress))
+    return integrate_missions(asked, report=lines_to(progress))
 
 
 def _checked(block: Block, place: int, settings: SolverSettings, law: WearLaw) -> Block:

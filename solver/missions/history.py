@@ -1,6 +1,7 @@
 """One mission history: the problem over the slow time, comparison with the reference solution, outcome."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -16,7 +17,7 @@ from solver.missions.step import MissionStep, attempt_step, values_of
 from solver.model import FloatArray
 from solver.newton.run import Run, guarded
 from solver.outcome import Outcome, absolute, is_known_to
-from solver.packing import Keep, Packed, packable
+from solver.packing import Packed, packable
 from solver.results.history import StartState, describe_cut_off, describe_uncertain, last_error, verdict
 from solver.settings import SHARE_OF_CAUSE, Passage
 from solver.wear.errors import Compared, HistoryError, compare, reach_target
@@ -171,13 +172,17 @@ def unworn_course(mission: MissionRequest) -> Course:
 
 
 def integrate_missions(
-    mission: MissionRequest, keep: Keep = lambda _: None, resume: Packed | None = None
+    mission: MissionRequest,
+    keep: Callable[[Packed], None] | None = None,
+    resume: Packed | None = None,
+    report: Callable[[str], None] = lambda _: None,
 ) -> MissionHistory:
     """Mission history of one point of a study, as far as computed, with its outcome.
 
-    keep: called after each step, as `Keep`. resume: as for `wear.history.integrate_together`.
+    keep, report: called after each step, with the progress and with words. resume: as for
+    `wear.history.integrate_together`.
     """
-    integrator = Integrator(mission.settings.time_limit, keep, resume)
+    integrator = Integrator(mission.settings.time_limit, keep, resume, report)
     solution = integrator.integrate(MissionProblem(mission))
     if solution.state is not None and not solution.breaks_off:
         reference = MissionProblem(mission, solution)

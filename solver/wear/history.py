@@ -1,7 +1,7 @@
 """Wear histories from one start state: integration, what each is compared with, result."""
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields, replace
 from functools import partial
 from typing import Any
@@ -11,7 +11,7 @@ import numpy as np
 from solver.accuracy.certificate import NOT_CERTIFIED
 from solver.harmonic_balance.state import Failure
 from solver.model import FloatArray, ReducedModel
-from solver.packing import Keep, Packed
+from solver.packing import Packed
 from solver.results.history import StartState, WearHistory, first_cut_off, judge, last_error
 from solver.results.state_report import LOOP_PHASES
 from solver.settings import SolverSettings, ToTheEnd
@@ -29,18 +29,19 @@ def integrate_together(
     settings: SolverSettings,
     start: StartState,
     requests: Sequence[WearRequest],
-    keep: Keep = lambda _: None,
+    keep: Callable[[Packed], None] | None = None,
     resume: Packed | None = None,
+    report: Callable[[str], None] = lambda _: None,
 ) -> Iterator[WearHistory]:
     """Wear histories from one start state, as far as computed; a history that fails raises no error.
 
     Each is that which it would be alone. All those with given steps are compared with one adaptive history.
 
     requests: they differ in nothing else but their steps, and their counts up to one last count.
-    keep: called from time to time, as `Keep`. resume: such progress of some of these histories, which go on from
-        there; the results are equal to the last bit, except `run_time`.
+    keep: called from time to time with the progress; report: after each step, with words. resume: such progress of
+        some of these histories, which go on from there; the results are equal to the last bit, except `run_time`.
     """
-    integrator, case = Integrator(settings.time_limit, keep, resume), None
+    integrator, case = Integrator(settings.time_limit, keep, resume, report), None
     if start.state is not None:
         case = build_case(model, start.penalty_omega, settings, start.resolution)
     for request in requests:

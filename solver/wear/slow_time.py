@@ -6,6 +6,7 @@ A `Course` has the ends of the steps, read at any counts, and the count of a tar
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
 from functools import cached_property, partial
 from typing import Any, Protocol
@@ -19,7 +20,7 @@ from solver.loading_history.sweep import STEPS_OF_REFERENCE
 from solver.model import FloatArray, IntArray
 from solver.newton.run import Run, guarded
 from solver.outcome import Outcome, in_digits
-from solver.packing import Keep, Packed, in_rows, pack, packable, unpack
+from solver.packing import Packed, in_rows, pack, packable, unpack
 from solver.settings import Resolution, WearTarget
 
 RTOL_RATIO = float(STEPS_OF_REFERENCE)
@@ -282,11 +283,18 @@ class Solution:
 class Integrator:
     """Integrates histories that belong together, each once.
 
-    time_limit: CPU seconds of each. keep: as `Keep`. resume: such progress.
+    time_limit: CPU seconds of each. keep: called from time to time with the packed progress; report: after each step,
+    with words. resume: such progress.
     """
 
-    def __init__(self, time_limit: float, keep: Keep = lambda _: None, resume: Packed | None = None) -> None:
-        self._time_limit, self._keep = time_limit, keep
+    def __init__(
+        self,
+        time_limit: float,
+        keep: Callable[[Packed], None] | None = None,
+        resume: Packed | None = None,
+        report: Callable[[str], None] = lambda _: None,
+    ) -> None:
+        self._time_limit, self._keep, self._report = time_limit, keep, report
         self._known: dict[str, Solution] = {} if resume is None else unpack(resume)
 
     def integrate(self, problem: SlowProblem, spent: float = 0.0) -> Solution:
@@ -304,11 +312,12 @@ class Integrator:
                 self._known[name] = Solution(state, course, after, True, budget.iterations, computing_time() - began)
                 return self._known[name]
             state, course = after
-            self._keep(f"{problem.unit} {in_digits(course.counts[-1], 3)}")
+            self._report(f"{problem.unit} {in_digits(course.counts[-1], 3)}")
             if budget.iterations >= saved_at + problem.iterations_per_save:
                 # done in every history, so that an interrupted one gives equal numbers
                 problem.run = problem.run.fresh()
                 state, saved_at = in_rows(state), budget.iterations
                 self._known[name] = Solution(state, course, None, False, saved_at, computing_time() - began)
-                # what its time limit has ended is not complete
-                self._keep(pack({key: each for key, each in self._known.items() if not each.breaks_off}))
+                if self._keep is not None:
+                    # what its time limit has ended is not complete
+                    self._keep(pack({key: each for key, each in self._known.items() if not each.breaks_off}))

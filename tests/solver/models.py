@@ -15,7 +15,6 @@ from solver.harmonic_balance.state import State
 from solver.loading_history.start_states import FrequencySweep
 from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel, needed_nodal_diameters, with_friction
 from solver.newton.run import Run
-from solver.packing import Keep, Packed
 from solver.results.history import StartState, WearHistory
 from solver.results.state_report import evaluated
 from solver.settings import Resolution, SolverSettings, first_resolution
@@ -178,16 +177,11 @@ def first_point(case: Case, omega: float, amplitude: float) -> State:
     return point
 
 
-def kept_in(kept: list[Packed] | None) -> Keep:
-    """Puts what another computation needs to go on into a list, if there is one, and leaves out the words."""
-    return lambda said: kept.append(said) if isinstance(said, Packed) and kept is not None else None
-
-
 def march_wear(
-    model, friction, start, wear_coefficient, step, scheme, cycles, settings, *, kept=None, resume=None, **asked
+    model, friction, start, wear_coefficient, step, scheme, cycles, settings, *, keep=None, resume=None, **asked
 ) -> WearHistory:
-    """The history from a start state; kept: takes its progress. asked: what else `WearRequest` has."""
-    wanted, keep = WearRequest(wear_coefficient, steps_of(scheme, step), cycles, **asked), kept_in(kept)
+    """The history from a start state; asked: what else `WearRequest` has."""
+    wanted = WearRequest(wear_coefficient, steps_of(scheme, step), cycles, **asked)
     return next(integrate_together(with_friction(model, friction), settings, start, (wanted,), keep, resume))
 
 

@@ -148,7 +148,7 @@ def test_a_history_goes_on_before_and_behind_a_jump(monkeypatch):
     monkeypatch.setattr(WearProblem, "iterations_per_save", 30)
     cycles, kept = np.linspace(0.0, 1000.0, 5), list[Packed]()
     asked = worn_wall(), 1e-3, wall_start(), WALL_WEAR, 1.0, "adaptive", cycles, IMPACT
-    whole = march_wear(*asked, kept=kept)
+    whole = march_wear(*asked, keep=kept.append)
     places = [unpack(progress) for progress in kept]
     # within the history itself, and within the reference solution: from the last one backwards
     for stage in ([n for n, at in enumerate(places) if len(at) == length] for length in {len(at) for at in places}):

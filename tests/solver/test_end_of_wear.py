@@ -121,7 +121,7 @@ def worn(cycles, scheme="adaptive", **more):
 def test_partial_slip_ends_in_the_limit_state_of_the_strips_also_where_it_was_interrupted(scheme, monkeypatch):
     monkeypatch.setattr(WearProblem, "iterations_per_save", 30)
     kept = list[Packed]()
-    found = worn(ToTheEnd(9), scheme, kept=kept)
+    found = worn(ToTheEnd(9), scheme, keep=kept.append)
     assert_same(worn(ToTheEnd(9), scheme, resume=kept[-1]), found)
     # the harmonics are given
     assert found.outcome is (Outcome.CONVERGED if scheme == "implicit" else Outcome.INACCURATE)

@@ -223,7 +223,7 @@ def test_a_joint_with_all_laws_wears_where_it_rubs_and_goes_on_to_the_last_bit(m
     settings, kept = SolverSettings(7, 96, rtol=0.1), []
     (start,) = branch_states(with_all_laws(), 0.4, 60.0, [600.0], settings)
     asked = with_all_laws(), 0.4, start, 1e-11, 1.0, "adaptive", np.array([0.0, 1e4, 1e5]), settings
-    whole = march_wear(*asked, kept=kept)
+    whole = march_wear(*asked, keep=kept.append)
     assert whole.outcome.meaning == "converged"
     assert whole.error_estimate < settings.rtol
     assert (whole.wear_depth[-1] > 0.0).tolist() == [False, True, False, True]

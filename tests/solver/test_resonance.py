@@ -112,7 +112,7 @@ def test_an_interrupted_search_and_history_are_equal_to_the_last_bit(word, monke
         ((_, again),) = sweeps.states(follow)
         assert_same(again, start)
     asked = model, 0.5, start, WEAR, 1e3, "implicit", CYCLES, settings
-    whole = march_from(*asked, kept=kept, follow=follow)
+    whole = march_from(*asked, keep=kept.append, follow=follow)
     assert len(kept) > 1
     for progress in (kept[0], kept[-1]):
         assert_same(march_from(*asked, resume=progress, follow=follow), whole)

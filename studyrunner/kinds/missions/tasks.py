@@ -88,9 +88,9 @@ class Mission(tasks.Task):
         # as many again for the reference solution
         n_planned = 2 * max(1, _n_computed(self.missions[-1]))
 
-        def note(said: Packed | str) -> None:
-            is_data = isinstance(said, Packed)
-            keep(said if is_data else f"{next(n_computed)} of about {n_planned} missions that are computed")
+        def note(progress: Packed) -> None:
+            keep(progress)
+            keep(f"{next(n_computed)} of about {n_planned} missions that are computed")
 
         wanted = {int(number) for number in self.missions}
         # with those before, for the wear of one

@@ -62,7 +62,7 @@ class AllowableAmplitude(Task):
 
             sweeps = FrequencySweep(model, amplitude, direction, self.settings, say)
             _, start = next(sweeps.states(frequencies))
-            return next(integrate_together(model, self.settings, start, [asked], say))
+            return next(integrate_together(model, self.settings, start, [asked], report=say))
 
         known = () if self.resume is None else unpack(self.resume)
         found = find_allowable(history_at, until, self.settings.rtol, known, lambda tried: keep(pack(tried)))

@@ -240,7 +240,7 @@ class History(_FromRest):
         for place in self.places:
             needed.setdefault(self.results[place][0], []).append(place)
         model, asked = self.joint.model(models), [self.asked(each, self.until) for each in needed]
-        histories = integrate_together(model, self.settings, unpack(self.start), asked, keep, self.resume)
+        histories = integrate_together(model, self.settings, unpack(self.start), asked, keep, self.resume, keep)
         for (each, places), history in zip(needed.items(), histories, strict=True):
             for place in places:
                 yield replace(build_result(self, each, history, self.results[place][1]), place=place)
