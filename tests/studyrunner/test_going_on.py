@@ -107,7 +107,7 @@ def test_a_history_that_was_given_up_goes_on_with_more_time(monkeypatch):
     own_clock, n_looks = newton.computing_time, 0
 
     def integrate(*given):
-        begun.append(given[-1])
+        begun.append(given[5])
         return own(*given)
 
     def clock():
