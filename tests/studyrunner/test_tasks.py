@@ -89,7 +89,7 @@ def test_a_plan_of_many_points_takes_little_memory():
     study = read_study("sdof_slider", [*many, "axes.scheme=implicit", "axes.step=500"])
     tracemalloc.start()
     try:
-        assert effort_of(plan_of(study).works).words == "40000 wear histories"
+        assert effort_of(study, plan_of(study).works).words == "40000 wear histories"
         assert tracemalloc.get_traced_memory()[1] < 250 * study.n_points
     finally:
         tracemalloc.stop()
