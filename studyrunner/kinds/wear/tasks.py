@@ -175,24 +175,31 @@ def _make_histories(
 ) -> Iterator[History]:
     """The histories of a study, in the order of their start states."""
     number = itertools.count()
-    for sweep, position, law, numbers, values in groups():
-        for together in sharing(values)[0]:
-            yield History(
-                number=next(number),
-                scenes=sweep.scenes,
-                settings=sweep.settings,
-                cost=seconds_of(sweep.n_unknowns, together.iterations),
-                n_unknowns=sweep.n_unknowns,
-                indices=tuple(tuple(numbers[list(same)].tolist()) for same in together.points),
-                joint=sweep.joint,
-                excitation=sweep.excitation,
-                law=law,
-                sweep=sweep.number,
-                position=position,
-                frequency=sweep.frequencies[position],
-                integrated=together.integrated,
-                **outputs,
-            )
+    for group in groups():
+        for together in sharing(group.values)[0]:
+            own = {
+                "cost": seconds_of(group.sweep.n_unknowns, together.iterations),
+                "indices": tuple(tuple(group.numbers[list(same)].tolist()) for same in together.points),
+                "integrated": together.integrated,
+            }
+            yield _history(group, number=next(number), **own, **outputs)
+
+
+def _history(group: _Group, **own: Any) -> History:
+    """A history from the start state of a group."""
+    sweep = group.sweep
+    return History(
+        scenes=sweep.scenes,
+        settings=sweep.settings,
+        n_unknowns=sweep.n_unknowns,
+        joint=sweep.joint,
+        excitation=sweep.excitation,
+        law=group.law,
+        sweep=sweep.number,
+        position=group.position,
+        frequency=sweep.frequencies[group.position],
+        **own,
+    )
 
 
 def _searches(
@@ -201,30 +208,16 @@ def _searches(
     """The searches for allowable amplitudes, one for equal points, each with all histories that it takes."""
     number, depth = itertools.count(), study.slow_time.largest_depth
     outputs = {**outputs, "variables": tuple(name for name in study.recorded if name not in ALLOWED)}
-    for sweep, position, law, numbers, values in groups():
+    for group in groups():
+        sweep, values = group.sweep, group.values
         for value in dict.fromkeys(values):
-            same = [place for place, each in zip(numbers.tolist(), values, strict=True) if each == value]
+            same = [place for place, each in zip(group.numbers.tolist(), values, strict=True) if each == value]
             largest = depth if value.scheme == "explicit" else None
             integrated = Integrated(value.scheme, value.step, largest, (value.wear_coefficient,), unworn=False)
             iterations = _iterations([(value.scheme, value.step)], study.output_counts[-1])
             cost = HISTORIES_OF_SEARCH * (sweep.cost * sweep.first_share + seconds_of(sweep.n_unknowns, iterations))
-            history = History(
-                number=next(number),
-                scenes=sweep.scenes,
-                settings=sweep.settings,
-                cost=cost,
-                n_unknowns=sweep.n_unknowns,
-                indices=(tuple(same),),
-                joint=sweep.joint,
-                excitation=sweep.excitation,
-                law=law,
-                sweep=sweep.number,
-                position=position,
-                frequency=sweep.frequencies[position],
-                integrated=(integrated,),
-                **outputs,
-            )
-            yield AllowableAmplitude.of(history)
+            own = {"cost": cost, "indices": (tuple(same),), "integrated": (integrated,)}
+            yield AllowableAmplitude.of(_history(group, number=next(number), **own, **outputs))
 
 
 def _share_histories(study: Study, points: Sequence[_Values]) -> tuple[tuple[_Together, ...], Counter[str]]:
