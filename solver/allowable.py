@@ -227,13 +227,15 @@ def _bracket(search: _Search) -> tuple[float, float]:
 def _judged(search: _Search, root: float, rtol: float) -> Allowable:
     """The amplitude with its error: that of the wear over its slope, and what the search has left."""
     known = [each for each in search.all if not math.isnan(each.wear)]
-    below = max((each for each in known if each.wear <= 1.0), key=lambda each: each.amplitude)
     above = min((each for each in known if each.wear > 1.0), key=lambda each: each.amplitude)
-    here, width, note = search.at(root), above.amplitude - below.amplitude, ""
-    if here.wear > 1.0 + SHARE_OF_RTOL * rtol:
+    # a larger amplitude may wear less again
+    less = (each for each in known if each.wear <= 1.0 and each.amplitude < above.amplitude)
+    below = max(less, key=lambda each: each.amplitude)
+    here, width, note, least = search.at(root), above.amplitude - below.amplitude, "", 0.0
+    if here.wear > 1.0 + SHARE_OF_RTOL * rtol or here.amplitude > above.amplitude:
         # where the wear is steep, the amplitude on the safe side
-        here = below
-    error = (abs(here.wear - 1.0) + here.error) * width / max(above.wear - below.wear, 1e-300)
+        here, least = below, width
+    error = max((abs(here.wear - 1.0) + here.error) * width / max(above.wear - below.wear, 1e-300), least)
     if above.wear > JUMP * below.wear and width <= 2.0 * SHARE_OF_RTOL * rtol * root:
         here, error = below, width
         note = f"the wear jumps from {below.wear:.3g} to {above.wear:.3g} times the target there"

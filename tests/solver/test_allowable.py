@@ -77,6 +77,14 @@ def test_a_jump_gives_the_amplitude_before_it():
     assert found.history.wear_depth[-1, 0] < DEPTH.value
 
 
+def test_where_the_wear_falls_again_the_first_amplitude_counts():
+    """A history below the others wears more, by round-off for one: the error is no negative width."""
+    found = find_allowable(of(lambda amplitude: amplitude / 1.7), DEPTH, RTOL, known=(Tried(1.5, 1.02, 0.01),))
+    assert found.amplitude < 1.5
+    assert found.amplitude + found.error >= 1.5
+    assert found.outcome is Outcome.INACCURATE
+
+
 def test_an_error_of_the_wear_is_one_of_the_amplitude(monkeypatch):
     """Where the wear grows slowly, the amplitude is known less than the wear."""
     monkeypatch.setattr(allowable, "SHARE_OF_RTOL", 1e-3)
