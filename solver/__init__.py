@@ -5,6 +5,7 @@ For use in Python, from this package itself:
 - `build_model`: a `ReducedModel` from mass, damping, stiffness and contact pairs;
 - `CubicSprings`, `IwanJoints`: pairs that do not rub, but are on springs or slip little by little, for `build_model`;
 - `with_contact_stiffness`: the model with a spring in series with each pair, as rough surfaces are;
+- `with_evolution`: the model of a joint whose friction, contact stiffness or wear coefficient change while it rubs;
 - `frequency_response`: the joint over frequency, a `FrequencyResponse`;
 - `backbone`: a nonlinear mode of the joint over its amplitude, a `Backbone`;
 - `modal_response`: the response near a resonance from a nonlinear mode alone, a `ModalResponse`;
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from solver.allowable import Allowable as Allowable
     from solver.allowable import allowable_amplitude as allowable_amplitude
     from solver.compliant_contact import with_contact_stiffness as with_contact_stiffness
+    from solver.compliant_contact import with_evolution as with_evolution
     from solver.contact.iwan import IwanJoints as IwanJoints
     from solver.contact.springs import CubicSprings as CubicSprings
     from solver.forced_response import FrequencyResponse as FrequencyResponse
@@ -56,7 +58,7 @@ if TYPE_CHECKING:
 # Loaded at the first use: rooms import each other through this package, and loading numba takes a while.
 _NAMES = {
     "allowable": "Allowable allowable_amplitude",
-    "compliant_contact": "with_contact_stiffness",
+    "compliant_contact": "with_contact_stiffness with_evolution",
     "contact.iwan": "IwanJoints",
     "contact.springs": "CubicSprings",
     "forced_response": "FrequencyResponse HarmonicBalance balance_of frequency_response",

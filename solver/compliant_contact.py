@@ -15,38 +15,122 @@ from dataclasses import replace
 from typing import cast
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from solver.model import FloatArray, IntArray, LinearModel, Matrix, ReducedModel
+from solver.model import (
+    TANGENTIAL_RATIO,
+    ContactInterface,
+    Evolution,
+    FloatArray,
+    IntArray,
+    LinearModel,
+    Matrix,
+    ReducedModel,
+)
 from solver.outcome import check
 
-TANGENTIAL_RATIO = 2.0 * (1.0 - 0.3) / (2.0 - 0.3)
-"""Tangential over normal contact stiffness: Mindlin's ratio for Poisson's ratio 0.3."""
+LARGEST_FRICTION = 2.0
+"""Of an evolution: measured ones of dry metals are below 1.5."""
 
 LARGEST_CONTACT_STIFFNESS = 1e22
 """N/m3. A spring between two layers of atoms in a metal has 1e21: what is stiffer is rigid."""
 
 
-def with_contact_stiffness(model: ReducedModel, contact_stiffness: float) -> ReducedModel:
+def with_contact_stiffness(model: ReducedModel, contact_stiffness: float | FloatArray) -> ReducedModel:
     """The model with a spring in series with each displacement of each pair that rubs.
 
     The relative displacements of the new model are those of the contact, at the same indices; the scaled compressions
     of the springs are further displacements at the end.
 
-    contact_stiffness: kappa_N per area, N/m3; the tangential one is `TANGENTIAL_RATIO` times as large.
+    contact_stiffness: kappa_N per area, N/m3, one number or (n_contact,); the tangential one is `TANGENTIAL_RATIO`
+    times as large.
     Raises ValueError where it is not between 0 and `LARGEST_CONTACT_STIFFNESS`.
     """
-    right = 0.0 < contact_stiffness <= LARGEST_CONTACT_STIFFNESS
+    given = np.asarray(contact_stiffness, np.float64)
+    right = bool(((given > 0.0) & (given <= LARGEST_CONTACT_STIFFNESS)).all())
     remedy = f"give a positive number, at most {LARGEST_CONTACT_STIFFNESS:g} N/m3"
     check(f"contact_stiffness is {contact_stiffness}", right, remedy)
-    components = model.contact.component_index
-    rub = model.contact.rubs[components // 3]
-    components, relative = components[rub], model.contact.relative[rub]
-    share = np.where(components % 3 == 0, 1.0, TANGENTIAL_RATIO)
-    springs = contact_stiffness * share * model.contact.area[components // 3]
-    # Compressions of stiff springs are small. Their scale leaves all displacements with stiffnesses of one size.
-    largest = float(np.abs(np.diag(model.linear[0].stiffness)).max())
-    scale = np.sqrt(largest / (largest + springs)) if largest > 0.0 else np.ones(relative.size)
+    relative, springs = _springs(model.contact, given)
+    scale = _scale_of(model.linear[0].stiffness, springs)
     linear = {k: _softened(each, relative, scale, springs * scale**2) for k, each in model.linear.items()}
+    return replace(model, linear=linear)
+
+
+def _springs(contact: ContactInterface, stiffness: FloatArray) -> tuple[IntArray, FloatArray]:
+    """Relative displacements (n,) of pairs that rub, and their springs (n,), N/m, of a stiffness per area, N/m3."""
+    components = contact.component_index
+    rub = contact.rubs[components // 3]
+    components, share = components[rub], np.where(components[rub] % 3 == 0, 1.0, TANGENTIAL_RATIO)
+    of_pairs = np.broadcast_to(stiffness, contact.area.shape)[components // 3]
+    return contact.relative[rub], of_pairs * share * contact.area[components // 3]
+
+
+def _scale_of(stiffness: Matrix, springs: FloatArray) -> FloatArray:
+    """Scale (n,) of compressions: those of stiff springs are small, and all stiffnesses are to be of one size."""
+    largest = float(np.abs(np.diag(stiffness)).max())
+    return np.sqrt(largest / (largest + springs)) if largest > 0.0 else np.ones(springs.size)
+
+
+def with_evolution(
+    model: ReducedModel,
+    energy: ArrayLike,
+    *,
+    friction_coefficient: ArrayLike | None = None,
+    contact_stiffness: ArrayLike | None = None,
+    wear_factor: ArrayLike | None = None,
+) -> ReducedModel:
+    """The model of a joint whose contact changes with the energy that friction has dissipated at a pair over its area.
+
+    Friction of a titanium pair rises while its oxide is rubbed off; joints of rough surfaces become stiffer while their
+    asperities wear (Armand and others, Eur. J. Mech. A 72 (2018); Fantetti and others, Tribol. Int. 138 (2019)). All
+    act in the balance of the same step on the slow time scale. Between the energies the properties are linear, beyond
+    the last one constant. The friction coefficient of functions such as `march_wear` is then None.
+
+    energy (k,): J/m2, ascending from 0. friction_coefficient, contact_stiffness, N/m3, wear_factor, times the wear
+    coefficient: (k,) for all pairs, or (n_contact, k); at least one of them. The unworn joint has the first ones.
+    Raises ValueError where a table does not ascend or fit, a value is out of its range, or the model has it already.
+    """
+    at, n_contact = np.asarray(energy, np.float64), model.contact.n_contact
+    right = at.ndim == 1 and at.size > 1 and at[0] == 0.0 and np.isfinite(at).all() and (np.diff(at) > 0.0).all()
+    check("energy", right, "give at least two ascending numbers, the first of them 0, J/m2")
+    tables = {"friction_coefficient": friction_coefficient, "contact_stiffness": contact_stiffness}
+    tables["wear_factor"] = wear_factor
+    most = {"friction_coefficient": LARGEST_FRICTION, "contact_stiffness": LARGEST_CONTACT_STIFFNESS}
+    check("evolution", any(each is not None for each in tables.values()), "give " + ", ".join(tables))
+    whole: dict[str, FloatArray | None] = dict.fromkeys(tables)
+    for name, given in tables.items():
+        if given is None:
+            continue
+        table = np.asarray(given, np.float64)
+        check(name, table.shape in ((at.size,), (n_contact, at.size)), f"give {at.size} numbers, one for each energy")
+        limit = most.get(name, np.inf)
+        check(name, bool(((table > 0.0) & (table <= limit)).all()), f"give numbers above 0, at most {limit:g}")
+        whole[name] = np.array(np.broadcast_to(table, (n_contact, at.size)))
+    stiffness, friction = whole["contact_stiffness"], whole["friction_coefficient"]
+    if stiffness is not None:
+        least = bool((stiffness >= stiffness[:, :1]).all())
+        check("contact_stiffness", least, "give none below the first one, that of the unworn joint")
+        model = with_contact_stiffness(model, stiffness[:, 0])
+    twice = friction is not None and model.contact.friction_coefficient is not None
+    check("friction_coefficient", not twice, "the model has one of its own already")
+    contact = replace(model.contact, evolution=Evolution(at, **whole, begun=np.zeros(n_contact)))
+    return replace(model, contact=contact.after(np.zeros(n_contact)))
+
+
+def stiffened(model: ReducedModel, contact: ContactInterface) -> ReducedModel:
+    """The model with the springs of a contact as they are now in its structure: for what knows no contact force."""
+    evolution = contact.evolution
+    now = evolution and evolution.now("contact_stiffness")
+    if not evolution or not now:
+        return model
+    table, linear = np.asarray(evolution.contact_stiffness), dict[int, LinearModel]()
+    first, springs = (_springs(contact, each)[1] for each in (table[:, 0], now[0]))
+    n = len(model.linear[0].mass) - first.size
+    scale = _scale_of(model.linear[0].stiffness[:n, :n], first)
+    for k, each in model.linear.items():
+        stiffness = each.stiffness.copy()
+        stiffness[range(n, n + first.size), range(n, n + first.size)] += (springs - first) * scale**2
+        linear[k] = replace(each, stiffness=stiffness)
     return replace(model, linear=linear)
 
 

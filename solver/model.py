@@ -39,6 +39,40 @@ class PairLaw(Protocol):
         """The `solver.contact.element.Element` of these pairs in one joint, of which these are the first fields."""
 
 
+TANGENTIAL_RATIO = 2.0 * (1.0 - 0.3) / (2.0 - 0.3)
+"""Tangential over normal contact stiffness (`solver.compliant_contact`): Mindlin's ratio for Poisson's ratio 0.3."""
+
+
+@dataclass(frozen=True)
+class Evolution(_ByRows):
+    """How the contact of pairs changes with the energy e that friction has dissipated there over their area, J/m2.
+
+    Linear between the energies of the table, and constant beyond the last one.
+
+    - energy (k,): J/m2, ascending from 0.
+    - friction_coefficient, contact_stiffness, N/m3, and wear_factor, times the wear coefficient, each (n_contact, k);
+      None for what does not change.
+    - begun (n_contact,): energy at which the contact is now.
+    """
+
+    energy: FloatArray
+    friction_coefficient: FloatArray | None
+    contact_stiffness: FloatArray | None
+    wear_factor: FloatArray | None
+    begun: FloatArray
+
+    def now(self, name: str) -> tuple[FloatArray, FloatArray] | None:
+        """A property of the pairs at their energies (n_contact,), and its slope over the energy; None if constant."""
+        table = getattr(self, name)
+        if table is None:
+            return None
+        width, pairs = np.diff(self.energy), np.arange(len(table))
+        place = np.clip(np.searchsorted(self.energy, self.begun, "right") - 1, 0, width.size - 1)
+        slope = (table[pairs, place + 1] - table[pairs, place]) / width[place]
+        inside = np.minimum(self.begun, self.energy[-1]) - self.energy[place]
+        return table[pairs, place] + slope * inside, np.where(self.begun < self.energy[-1], slope, 0.0)
+
+
 @dataclass(frozen=True)
 class ContactInterface(_ByRows):
     """Contact pairs, `n_contact` of them.
@@ -52,6 +86,7 @@ class ContactInterface(_ByRows):
     - edge (n_contact,): True for pairs at which the modelled contact ends but the bodies continue: load or wear of such
       a pair shows that the contact is cut off. None where the bodies end with their pairs.
     - laws: of pairs that do not rub and open; each pair belongs to one at most.
+    - evolution: what changes with the energy that friction dissipates; None where nothing does.
     """
 
     dofs: IntArray
@@ -63,6 +98,7 @@ class ContactInterface(_ByRows):
     friction_coefficient: FloatArray | None = None
     edge: BoolArray | None = None
     laws: tuple[PairLaw, ...] = ()
+    evolution: Evolution | None = None
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -96,6 +132,53 @@ class ContactInterface(_ByRows):
         """Friction coefficient (n_contact,), which the model has; 0 of pairs with a law of `laws`."""
         assert self.friction_coefficient is not None
         return np.where(self.rubs, self.friction_coefficient, 0.0)
+
+    def after(self, energy: FloatArray) -> "ContactInterface":
+        """The contact after some more dissipated energy (n_contact,), J/m2; the same object where nothing changes."""
+        if self.evolution is None:
+            return self
+        evolved = replace(self.evolution, begun=self.evolution.begun + energy)
+        friction = evolved.now("friction_coefficient")
+        coefficient = self.friction_coefficient if friction is None else friction[0]
+        return replace(self, evolution=evolved, friction_coefficient=coefficient)
+
+    def _slope(self, name: str) -> FloatArray:
+        found = self.evolution and self.evolution.now(name)
+        return np.where(self.rubs, found[1], 0.0) if found else np.zeros(self.n_contact)
+
+    @cached_property
+    def friction_slope(self) -> FloatArray:
+        """Change of the friction coefficient with the dissipated energy (n_contact,), m2/J."""
+        return self._slope("friction_coefficient")
+
+    @cached_property
+    def wear_factor(self) -> tuple[FloatArray, FloatArray]:
+        """Wear coefficient over that of the unworn joint (n_contact,), and its change with the energy, m2/J."""
+        found = self.evolution and self.evolution.now("wear_factor")
+        return found or (np.ones(self.n_contact), np.zeros(self.n_contact))
+
+    @cached_property
+    def flexibility(self) -> tuple[FloatArray, FloatArray]:
+        """Flexibility of the contact, less that in the linear structure (n_contact, 3), m/N, and its change with the
+        energy. A spring kappa alpha in series moves a pair by `lambda / (kappa alpha)`, exactly in each harmonic.
+        """
+        evolution = self.evolution
+        found = evolution and evolution.now("contact_stiffness")
+        if not evolution or evolution.contact_stiffness is None or not found:
+            return np.zeros((self.n_contact, 3)), np.zeros((self.n_contact, 3))
+        stiffness, slope = found
+        share = self.rubs[:, None] / (self.area[:, None] * np.array([1.0, TANGENTIAL_RATIO, TANGENTIAL_RATIO]))
+        first = evolution.contact_stiffness[:, 0]
+        return (1.0 / stiffness - 1.0 / first)[:, None] * share, (-slope / stiffness**2)[:, None] * share
+
+    def relative_change(self, energy: FloatArray) -> float:
+        """Largest relative change of what the contact is now by a change of the energy (n_contact,), J/m2."""
+        largest = 0.0
+        for name in ("friction_coefficient", "contact_stiffness", "wear_factor"):
+            found = self.evolution and self.evolution.now(name)
+            if found:
+                largest = max(largest, float(np.abs(found[1] * energy / found[0])[self.rubs].max(initial=0.0)))
+        return largest
 
     @cached_property
     def has_normal(self) -> BoolArray:

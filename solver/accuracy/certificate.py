@@ -120,7 +120,7 @@ def _series(joint: Joint, values_h: FloatArray) -> FloatArray:
 
 def _residual(joint: Joint, evaluation: Evaluation) -> float:
     """Scaled residual of the reported state, or that of Newton's iteration where larger."""
-    motion = joint.to_relative(evaluation.displacement_h)
+    motion = joint.motion(evaluation)
     left = joint.structure.apply(motion) + joint.to_relative(evaluation.force_h) - joint.structure.force_h
     # at an unbounded resonance the forces are small differences of large ones: error that round-off may hide
     parts = np.abs(joint.structure.static_stiffness) @ np.abs(motion[:, 1:])
@@ -157,7 +157,7 @@ def _amplitude(values_h: FloatArray) -> FloatArray:
 
 def _energy_error(joint: Joint, evaluation: Evaluation, flexed: FloatArray) -> float:
     """Energy imbalance of a period over the largest work in it."""
-    motion, force = joint.to_relative(evaluation.displacement_h), joint.to_relative(evaluation.force_h)
+    motion, force = joint.motion(evaluation), joint.to_relative(evaluation.force_h)
     load = joint.structure.force_h
     excitation, damping, contact = (_work(joint, each, motion) for each in (load, joint.structure.apply(motion), force))
     dissipation = float(joint.law.friction_work(evaluation).sum())

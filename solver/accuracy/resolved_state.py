@@ -183,7 +183,7 @@ class ResolvedState:
         return max(NEGLIGIBLE * float(np.linalg.norm(response)), 1e-300)
 
     def _input_work(self) -> float:
-        return abs(self.joint.structure.input_work(self.joint.to_relative(self.point.evaluation.displacement_h)))
+        return abs(self.joint.structure.input_work(self.joint.motion(self.point.evaluation)))
 
 
 def shifted(resolution: Resolution, levels: int) -> Resolution:

@@ -52,7 +52,7 @@ class CoulombPairs(Element):
         # an open pair transmits nothing
         switching = ~(at.stuck | (at.status_t == SEPARATED).all(axis=1))
         basis_t, analysis_h = (part.T.copy() for part in (self.basis.synthesis, self.basis.analysis))
-        starts = np.zeros((switching.size, 2, 3 * len(analysis_h)))
+        starts = np.zeros((switching.size, 2, 3 * len(analysis_h) + 1))
         if before_t is not None and history is not None:
             start = history * self.penalty.tangential[:, None]
             path = Path(before_t, at.predicted_t, self.friction_coefficient, start)
@@ -62,6 +62,7 @@ class CoulombPairs(Element):
         closing = np.flatnonzero((self.dofs[:, 0] >= 0) & switching)
         mean_normal_tangent(closing, at.predicted_t, basis_t, analysis_h, out[0])
         out[1][:] /= self.state_stiffness[:, None]
+        out[2][:, -1] /= self.state_stiffness
 
     def started_from(self, at: Marched, history: FloatArray, /) -> FloatArray:  # noqa: D102
         return np.where(at.slid[:, None], at.start / self.state_stiffness[:, None], history)

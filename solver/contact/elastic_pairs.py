@@ -4,8 +4,8 @@ Floats and arrays only; `coulomb` has the law of a sample. The first period star
 ones from the end of the period before, until the state repeats. Where the direction of slip varies, its change falls
 slowly. So after a few periods Newton's method on the periodicity gives the start, which the next period confirms.
 
-Derivatives have 3m columns for the harmonics of the predicted force, those of one component after the other, and 2 for
-the state at the start of the period.
+Derivatives have 3m columns for the harmonics of the predicted force, those of one component after the other, 2 for the
+state at the start of the period, and one for the friction coefficient.
 """
 
 from __future__ import annotations
@@ -137,13 +137,23 @@ def _slip_work(normal_t: FloatArray, state_t: FloatArray) -> float:
 
 
 def by_columns(series_t: FloatArray) -> FloatArray:
-    """Rows (N, 5m + 2) of a synthesis (N, m) between zeros: from (2 - i) m on, one has the derivative of component i of
-    the predicted force by all 3m + 2 columns.
+    """Rows (N, 5m + 3) of a synthesis (N, m) between zeros: from (2 - i) m on, one has the derivative of component i of
+    the predicted force by all 3m + 3 columns.
     """
     n_samples, m = series_t.shape
-    rows = np.zeros((n_samples, 5 * m + 2))
+    rows = np.zeros((n_samples, 5 * m + 3))
     rows[:, 2 * m : 3 * m] = series_t
     return rows
+
+
+@register_jitable
+def fill_friction_column(normal_t: FloatArray, friction: float, by_column_t: FloatArray) -> None:
+    """Normal force over friction in the column of the friction coefficient, as a normal force that acts on the limit
+    alone: `d(mu p_N) = mu (dp_N + p_N / mu dmu)`.
+    """
+    place = by_column_t.shape[1] - 1
+    for n in range(normal_t.size):
+        by_column_t[n, place] = max(normal_t[n], 0.0) / friction if friction > 0.0 else 0.0
 
 
 @njit(cache=True)
@@ -152,24 +162,26 @@ def march_tangent(
 ) -> None:
     """Derivatives of the results of `march_period` of some pairs (n,), with the periodicity, into `out`.
 
-    starts (n_contact, 2, 3m): of the start. by_column_t: the synthesis as `by_columns` gives it. analysis_h (m, N):
+    starts (n_contact, 2, 3m + 1): of the start. by_column_t: the synthesis as `by_columns` gives it. analysis_h (m, N):
     contiguous transpose of the analysis.
     """
     m, n_samples = analysis_h.shape
-    w = 3 * m + 2
+    w = 3 * m + 3
     dforce_t = np.empty((n_samples, 2 * w))
     for pair in pairs:
         predicted_t, friction, start = period.predicted_t[pair], period.friction[pair], period.start[pair]
         dstate, dstart, work = np.zeros((2, w)), np.zeros((2, w)), np.zeros(w)
-        dstate[0, w - 2] = dstate[1, w - 1] = 1.0
+        dstate[0, 3 * m] = dstate[1, 3 * m + 1] = 1.0
+        fill_friction_column(predicted_t[0], friction, by_column_t)
         first, second = period.state_t[pair, 0, 0], period.state_t[pair, 1, 0]
         _pass_tangent(dstate, dforce_t, work, predicted_t, friction, first, second, by_column_t)
         plain = min(period.periods[pair] - 1, PLAIN_PERIODS)
         if plain == 0 or not periodic_start(dstate, dstart):
             # a pair that has come to stick: the periodicity does not determine its start, the periods before do
             for i in range(2):
-                for j in range(w - 2):
+                for j in range(3 * m):
                     dstart[i, j] = starts[pair, i, j]
+                dstart[i, w - 1] = starts[pair, i, 3 * m]
             first, second = start[0], start[1]
             unused_t, unused = np.empty((n_samples, 2 * w)), np.zeros(w)
             for _ in range(plain):
@@ -194,7 +206,7 @@ def _pass_tangent(
     dstate (2, w): derivative of the state, from start to end, in place. dforce_t (N, 2w): receives those of both forces
     of friction; that of the slip work is added to work (w,).
     """
-    n_samples, w, m = predicted_t.shape[1], work.size, (work.size - 2) // 3
+    n_samples, w, m = predicted_t.shape[1], work.size, (work.size - 3) // 3
     for n in range(n_samples):
         pressed, pull_1, pull_2 = predicted_t[0, n], predicted_t[1, n], predicted_t[2, n]
         normal, _, _, next_1, next_2, status = contact_sample(pressed, pull_1, pull_2, friction, first, second)
@@ -231,8 +243,10 @@ def periodic_start(dend: FloatArray, dstart: FloatArray) -> bool:
     is one.
     """
     w, found = dend.shape[1], False
-    for column in range(w - 2):
-        dstart[0, column], dstart[1, column], found = solve_periodicity(dend, w - 2, dend[0, column], dend[1, column])
+    for column in range(w):
+        if column < w - 3 or column == w - 1:
+            change_1, change_2 = dend[0, column], dend[1, column]
+            dstart[0, column], dstart[1, column], found = solve_periodicity(dend, w - 3, change_1, change_2)
     return found
 
 
@@ -242,16 +256,19 @@ def assemble(
 ) -> None:
     """Derivatives of the harmonics of friction and of the slip work of a pair, into `out`.
 
-    dforce_t (N, 2w), work (w,): derivatives, in the last two columns by the start of the period. dstart (2, w): of the
-    start.
+    dforce_t (N, 2w), work (w,): derivatives, with those by the start of the period. dstart (2, w): of the start.
     """
-    tangent, work_tangent, m, w = out[0][pair], out[1][pair], analysis_h.shape[0], work.size
+    tangent, work_tangent, by_friction = out[0][pair], out[1][pair], out[2][pair]
+    m, w = analysis_h.shape[0], work.size
     dforce_h = np.empty((m, 2 * w))
     np.dot(analysis_h, dforce_t, dforce_h)
-    for k in range(w - 2):
-        work_tangent[k] = work[k] + work[w - 2] * dstart[0, k] + work[w - 1] * dstart[1, k]
+    one, other, last = w - 3, w - 2, w - 1
+    for k in range(one):
+        work_tangent[k] = work[k] + work[one] * dstart[0, k] + work[other] * dstart[1, k]
+    by_friction[one] = work[last] + work[one] * dstart[0, last] + work[other] * dstart[1, last]
     for row in range(m):
         for along in range(2):
-            own = dforce_h[row, along * w : (along + 1) * w]
-            for k in range(w - 2):
-                tangent[(1 + along) * m + row, k] = own[k] + own[w - 2] * dstart[0, k] + own[w - 1] * dstart[1, k]
+            own, place = dforce_h[row, along * w : (along + 1) * w], (1 + along) * m + row
+            for k in range(one):
+                tangent[place, k] = own[k] + own[one] * dstart[0, k] + own[other] * dstart[1, k]
+            by_friction[place] = own[last] + own[one] * dstart[0, last] + own[other] * dstart[1, last]

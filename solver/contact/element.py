@@ -9,7 +9,7 @@ replaces what it computes faster, or what is different for it.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -23,9 +23,10 @@ if TYPE_CHECKING:
     from solver.structure.fourier import FourierBasis
     from solver.structure.penalty import Penalty
 
-Tangents = tuple[FloatArray, FloatArray]
+Tangents = tuple[FloatArray, FloatArray, FloatArray]
 """Derivatives by the harmonics of the predicted force: of those of the contact force (n, 3m, 3m), dimensionless, and of
-the slip work (n, 3m)."""
+the slip work (n, 3m); and by the friction coefficient: of the harmonics of the contact force, N, and of the slip work,
+J, one after the other (n, 3m + 1)."""
 
 
 @dataclass(frozen=True)
@@ -121,6 +122,10 @@ class Element(ABC):
         """Pairs (k,) whose mean position the law alone does not determine: masses."""
         return np.full(self.places.size, self.rate_dependent)
 
+    def rubbing(self, friction: FloatArray) -> Element:
+        """The law with other friction coefficients of all pairs of the joint (n_contact,)."""
+        return replace(self, friction_coefficient=friction[self.places])
+
     def own(self, history: FloatArray) -> FloatArray:
         """The history of these pairs in that of all of the joint."""
         return history[self.places, : self.n_history]
@@ -176,12 +181,12 @@ class Element(ABC):
         return Marched(predicted_t, force_t, **{**nothing, **others})
 
     def tangent(self, at: Marched, history: FloatArray | None = None, before_t: FloatArray | None = None) -> Tangents:
-        """Exact derivatives by the harmonics of the predicted force, with the periodicity, and with the way from
+        """Exact derivatives by predicted force and friction coefficient, with the periodicity, and with the way from
         history and force of `march`, where these are given. Entries of displacements that a pair does not have are
         without meaning.
         """
         k, size = len(at.start), 3 * at.force_h.shape[2]
-        out = np.zeros((k, size, size)), np.zeros((k, size))
+        out = np.zeros((k, size, size)), np.zeros((k, size)), np.zeros((k, size + 1))
         self.switching_tangent(at, history, before_t, out)
         out[0][at.stuck] = np.eye(size)
         return out

@@ -7,7 +7,7 @@ elastic joint are `CoulombPairs`, masses on rigid ground `SlidingMasses`; `solve
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, TypeVar, cast
 
@@ -42,6 +42,10 @@ class Elements(Element):
     @property
     def moves_on(self) -> BoolArray:  # noqa: D102
         return self._joined([each.moves_on for each in self.parts])
+
+    def rubbing(self, friction: FloatArray) -> Element:  # noqa: D102
+        parts = tuple(each.rubbing(friction) for each in self.parts)
+        return replace(self, friction_coefficient=friction, parts=parts)
 
     @cached_property
     def _order(self) -> IntArray:
@@ -78,8 +82,8 @@ class Elements(Element):
         for each in self.parts:
             before = None if history is None else each.own(history)
             found.append(each.tangent(at.at(each.places), before, None if before_t is None else before_t[each.places]))
-        force, work = (self._joined([each[place] for each in found]) for place in (0, 1))
-        return force, work
+        force, work, by_friction = (self._joined([each[place] for each in found]) for place in range(3))
+        return force, work, by_friction
 
     def friction_work(self, at: Marched) -> FloatArray:  # noqa: D102
         return self._each(lambda each, part: each.friction_work(part), at)

@@ -26,7 +26,7 @@ from numba import njit
 from numba.extending import register_jitable
 
 from solver.contact.coulomb import SEPARATED, SLIP, STICK, friction_force, friction_limit, slip_tangent
-from solver.contact.elastic_pairs import MOST_PERIODS, Period, assemble, periodic_start
+from solver.contact.elastic_pairs import MOST_PERIODS, Period, assemble, fill_friction_column, periodic_start
 from solver.contact.element import Tangents
 from solver.model import FloatArray, IntArray
 
@@ -256,11 +256,12 @@ def mass_tangent(
     steps, as `by_columns` gives them. analysis_h (m, N): harmonics from such means; contiguous.
     """
     m, n_samples = analysis_h.shape
-    w, (slopes, speed_t), (sample_t, mean_t) = 3 * m + 2, steps, by_column_t
+    w, (slopes, speed_t), (sample_t, mean_t) = 3 * m + 3, steps, by_column_t
     dforce_t, after, dstart = np.empty((n_samples, 2 * w)), np.empty((5, w)), np.zeros((2, w))
     for place, pair in enumerate(pairs):
         work, velocity = np.zeros(w), np.zeros((2, w))
-        velocity[0, w - 2] = velocity[1, w - 1] = 1.0
+        velocity[0, 3 * m] = velocity[1, 3 * m + 1] = 1.0
+        fill_friction_column(period.predicted_t[pair, 0], period.friction[pair], sample_t)
         for n in range(n_samples):
             normal = max(period.predicted_t[pair, 0, n], 0.0)
             by_limit = period.friction[pair] if normal > 0.0 else 0.0
@@ -274,6 +275,6 @@ def mass_tangent(
             for j in range(w):
                 dforce_t[n, j], dforce_t[n, w + j] = after[0, j], after[1, j]
                 velocity[0, j], velocity[1, j] = after[2, j], after[3, j]
-                work[j] = work[j] + normal * step * after[4, j] + speed * step * by_0[j]
+                work[j] = work[j] + normal * step * after[4, j] + (speed * step * by_0[j] if j < m else 0.0)
         periodic_start(velocity, dstart)
         assemble(out, pair, dforce_t, work, dstart, analysis_h)

@@ -70,12 +70,12 @@ def slide_along(pairs: IntArray, path: Path, out: FloatArray) -> None:
 
 
 def slide_tangent(pairs: IntArray, path: Path, synthesis: FloatArray, out: FloatArray) -> None:
-    """Derivatives of the states of `slide_along` by the harmonics of the predicted force at the end of the path, into
-    out (n_contact, 2, 3m). synthesis (m, N): as in `FourierBasis`.
+    """Derivatives of the states of `slide_along` by the harmonics of the predicted force at the end of the path, and by
+    the friction coefficient there, into out (n_contact, 2, 3m + 1). synthesis (m, N): as in `FourierBasis`.
     """
     # with the same function: each one more is a second of compiling
     notes = np.empty((pairs.size, 2 * PARTS + 3, NOTES))
-    _trace_back(pairs, _slide(pairs, path, np.empty_like(path.state), notes), notes, synthesis, out)
+    _trace_back(pairs, path, _slide(pairs, path, np.empty_like(path.state), notes), notes, synthesis, out)
 
 
 @njit(cache=True)
@@ -109,7 +109,9 @@ def _slide(pairs: IntArray, path: Path, out: FloatArray, notes: FloatArray) -> I
 
 
 @njit(cache=True)
-def _trace_back(pairs: IntArray, counts: IntArray, notes: FloatArray, synthesis: FloatArray, out: FloatArray) -> None:
+def _trace_back(
+    pairs: IntArray, path: Path, counts: IntArray, notes: FloatArray, synthesis: FloatArray, out: FloatArray
+) -> None:
     """As `slide_tangent`, from the noted steps.
 
     later (2, 2), weights (N, 6): derivatives of the end of a path by the place after a step and by the forces, by rows.
@@ -140,6 +142,9 @@ def _trace_back(pairs: IntArray, counts: IntArray, notes: FloatArray, synthesis:
                 if weight != 0.0:
                     for k in range(m):
                         out[pair, entry // 3, entry % 3 * m + k] += weight * synthesis[k, n]
+                    if entry % 3 == 0 and path.friction[pair] > 0.0:
+                        # of the radius mu p_N at the end
+                        out[pair, entry // 3, 3 * m] += weight * path.last[pair, 0, n] / path.friction[pair]
 
 
 @register_jitable

@@ -148,16 +148,16 @@ def _between(knots: FloatArray, at: FloatArray) -> tuple[np.ndarray, FloatArray,
 class PowerFactors:
     """The factors f of the law "power" for the pairs of a joint.
 
-    rest: r, 1. per_work (n_contact,): d phi over the slip work, 1/J, at `frequency`, Hz.
+    rest: r, 1. per_work (n_contact,): d phi over the work of friction, 1/J, at `frequency`, Hz.
     """
 
     rest: float
     per_work: FloatArray
     frequency: float = 1.0
 
-    def at(self, slip_work: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Factor of each pair (n_contact,), and the derivative of factor times slip work by the slip work."""
-        power = self.per_work * slip_work
+    def at(self, work: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Factor of each pair (n_contact,) at a work of friction, J; and derivative of factor times work by work."""
+        power = self.per_work * work
         falling = (1.0 - self.rest) * np.exp(-power)
         return self.rest + falling, self.rest + falling * (1.0 - power)
 
@@ -166,13 +166,32 @@ class PowerFactors:
 class WearingWork:
     """The wearing work of the pairs of one joint.
 
-    factor (n_contact,): c, 1. least (n_contact,): q alpha, J. table, power: f; None for 1.
+    surface (n_contact,): c of the surfaces, 1. least (n_contact,): q alpha, J. table, power: f; None for 1.
+    friction (n_contact,): mu, a factor of c; None in laws without it.
     """
 
-    factor: FloatArray | float = 1.0
+    surface: FloatArray | float = 1.0
     least: FloatArray | float = 0.0
     table: PairFactors | None = None
     power: PowerFactors | None = None
+    friction: FloatArray | None = None
+
+    @property
+    def factor(self) -> FloatArray | float:
+        """C (n_contact,), 1."""
+        return self.surface if self.friction is None else self.surface * self.friction
+
+    def _reduced(self, slip_work: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Factor f of the law "power" (n_contact,), and derivative of factor times work by work; 1 in other laws."""
+        if self.power is None or self.friction is None:
+            return np.ones_like(slip_work), np.ones_like(slip_work)
+        return self.power.at(self.friction * slip_work)
+
+    def rubbing(self, friction: FloatArray) -> WearingWork:
+        """The wearing work with other friction coefficients (n_contact,)."""
+        if self.friction is None or np.array_equal(friction, self.friction):
+            return self
+        return replace(self, friction=friction)
 
     def at(self, frequency: float) -> WearingWork:
         """The wearing work at a frequency, Hz."""
@@ -197,12 +216,17 @@ class WearingWork:
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Derivatives (n_contact,) of `work` by slip work, 1, normal force, m, and depth, N."""
         by_work, none = np.where(slip_work >= self.least, self.factor, 0.0), np.zeros_like(slip_work)
-        if self.power is not None:
-            by_work = by_work * self.power.at(slip_work)[1]
+        by_work = by_work * self._reduced(slip_work)[1]
         if self.table is None:
             return by_work, none, none
         work, (value, by_force, by_depth) = self._without_table(slip_work), self.table.at(normal_force, depth)
         return by_work * value, work * by_force, work * by_depth
+
+    def by_friction(self, slip_work: FloatArray) -> FloatArray:
+        """Derivative (n_contact,), J, of `work` by the friction coefficient, at constant slip work."""
+        if self.friction is None:
+            return np.zeros_like(slip_work)
+        return np.asarray(self.surface * slip_work * self._reduced(slip_work)[1])
 
     def amplification(self, slip_work: FloatArray, normal_force: FloatArray, depth: FloatArray) -> float:
         """Ratio of the relative errors of total wearing work and slip work, at least 1; above 1 near a threshold, and
@@ -241,21 +265,21 @@ class WearingWork:
         self,
         gain: FloatArray | float,
         at: tuple[FloatArray, FloatArray, FloatArray],
-        slip_work_tangent: FloatArray,
-        normal_force_tangent: FloatArray,
+        tangents: tuple[FloatArray, FloatArray],
+        pushed: FloatArray,
     ) -> FloatArray:
         """Derivative (n_contact, k) of the growth from the derivatives (n_contact, k) of slip work and mean force.
 
         at: slip work, J, mean normal force, N, and depth, m, at the end of the step, (n_contact,) each.
+        pushed (n_contact, k): derivative of the growth by what changes beside these, at constant depth.
         """
         by_work, by_force, by_depth = self.slopes(*at)
-        follows = gain / (1.0 - gain * by_depth)
-        grown: FloatArray = (follows * by_work)[:, None] * slip_work_tangent
-        return grown + (follows * by_force)[:, None] * normal_force_tangent
+        follows, (slip_work_tangent, normal_force_tangent) = 1.0 / (1.0 - gain * by_depth), tangents
+        grown: FloatArray = (follows * (gain * by_work))[:, None] * slip_work_tangent
+        return grown + (follows * (gain * by_force))[:, None] * normal_force_tangent + follows[:, None] * pushed
 
     def _without_table(self, slip_work: FloatArray) -> FloatArray:
-        work = self.factor * np.maximum(slip_work - self.least, 0.0)
-        return work if self.power is None else work * self.power.at(slip_work)[0]
+        return np.asarray(self.factor * np.maximum(slip_work - self.least, 0.0) * self._reduced(slip_work)[0])
 
 
 ARCHARDS_WORK = WearingWork()
@@ -267,14 +291,13 @@ def wearing_work(law: WearLaw, contact: ContactInterface, wear_coefficient: floa
 
     Raises ValueError where the surfaces of the law are not those of the pairs.
     """
-    factor, power, table = surface_factors(contact.surface, law.surfaces) if law.surfaces else 1.0, None, None
-    if law.name in ("energy", "power"):
-        factor = factor * contact.friction
+    surface, power, table = surface_factors(contact.surface, law.surfaces) if law.surfaces else 1.0, None, None
+    friction = contact.friction if law.name in ("energy", "power") else None
     least = law.threshold * contact.area if law.name == "threshold" else 0.0
     if isinstance(law.table, PowerTerms):
         rest = law.table.adhesive / wear_coefficient if wear_coefficient > 0.0 else 1.0
-        power = PowerFactors(rest, law.table.decay * contact.friction / contact.area)
+        power = PowerFactors(rest, law.table.decay / contact.area)
     elif law.table is not None:
         pressure, depth, values = (np.array(part) for part in (law.table.pressure, law.table.depth, law.table.factor))
         table = PairFactors(pressure, depth, values, contact.area, np.array(law.worn) if law.worn else 0.0)
-    return WearingWork(factor, least, table, power)
+    return WearingWork(surface, least, table, power, friction)

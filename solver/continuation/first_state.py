@@ -72,7 +72,7 @@ def solve_first_state(case: Case, omega: float, excitation_amplitude: float, run
         if arrived and run.is_stable(whole.joint, raised.evaluation):
             return raised
         unstable |= arrived
-    settled = relax_to_periodic(whole.joint, whole.wear_depth, rest, quiet, run)
+    settled = relax_to_periodic(whole.joint, rest.evaluation.slow, rest, quiet, run)
     return Failure(Outcome.UNSTABLE, settled.message) if unstable and isinstance(settled, Failure) else settled
 
 

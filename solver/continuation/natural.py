@@ -164,6 +164,6 @@ def _shifted(joint: Joint, state: State, run: Run) -> tuple[State, bool]:
     )
 
     def balance_from(part: float, _: State) -> Balance:
-        return Balance(joint, at.start_history + part * shift, at.wear_depth)
+        return Balance(joint, at.start_history + part * shift, at.wear_depth, energy=at.energy)
 
     return follow_naturally(balance_from, replace(state, parameter=0.0), 1.0, run)

@@ -46,7 +46,7 @@ def phase_lag(joint: Joint, at: Evaluation) -> float:
 
 def excitation_product(joint: Joint, at: Evaluation) -> complex:
     """`F^H x`, N m, of excitation and displacements in the first harmonic."""
-    return _changes(joint, joint.to_relative(at.displacement_h))[0] + joint.structure.drive_offset
+    return _changes(joint, joint.motion(at))[0] + joint.structure.drive_offset
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,8 @@ class _AtLag:
     lag: float
 
     def evaluate(self, predicted_h: FloatArray, values: FloatArray) -> Bordered:
-        joint = self.case.joint(float(values[0]), self.balance.joint.excitation_amplitude)
+        before = self.balance.joint
+        joint = self.case.joint(float(values[0]), before.excitation_amplitude).with_contact(before.contact)
         balance = replace(self.balance, joint=joint)
         at = balance.evaluate(predicted_h)
         product = excitation_product(joint, at)
@@ -128,7 +129,7 @@ def rise_of_response(state: Bordered, run: Run, accuracy: float) -> tuple[float,
     accuracy: first change over the second one that does not count.
     """
     joint, at = state.balance.joint, state.at
-    fixed = Balance(joint, at.start_history, at.wear_depth)
+    fixed = Balance(joint, at.start_history, at.wear_depth, energy=at.energy)
     by_frequency = frequency_derivative(fixed, at)
     (step,) = run.steps(fixed, at, [-by_frequency.force], min(FORCING, 0.1 * accuracy))
     product, response = _changes(joint, fixed.linearise(at).rest_and_motion(step)[1])
@@ -142,14 +143,14 @@ def frequency_derivative(balance: Balance, at: Evaluation) -> FrequencySlope:
     of the responses; those of masses on rigid ground by differences.
     """
     joint = balance.joint
-    orders, u = joint.basis.orders, joint.to_relative(at.displacement_h)
+    orders, u = joint.basis.orders, joint.motion(at)
     slope = frequency_slope(joint.model, joint.omega, joint.excitation_amplitude, orders, u)
     if not joint.law.rate_dependent:
         return slope
     # longer than usual: the round-off of the static forces is small against the change of all others
     length = 10.0 * DIFFERENCE * joint.omega
     ahead = replace(balance, joint=replace(joint, omega=joint.omega + length)).evaluate(at.predicted_h)
-    product, response = _changes(joint, joint.to_relative((ahead.displacement_h - at.displacement_h) / length))
+    product, response = _changes(joint, (joint.motion(ahead) - joint.motion(at)) / length)
     force = slope.force + (ahead.residual - at.residual) / length
     return FrequencySlope(force, slope.product + product, slope.response + response)
 

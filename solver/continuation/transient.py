@@ -88,7 +88,7 @@ class Transient:
 
     def after(self, evaluation: Evaluation, before: Motion, inverse: float) -> Motion:
         """Motion at the end of a step, from the solution of the balance of the step."""
-        amplitudes = with_static(self.joint.to_relative(evaluation.displacement_h)).T
+        amplitudes = with_static(self.joint.motion(evaluation)).T
         rates = self.rates + inverse
         each = zip(self.linear, rates, self._loads(before, inverse), amplitudes, strict=True)
         displacement = np.array([whole_motion(of, rate, self.relative, load, moved) for of, rate, load, moved in each])
@@ -101,13 +101,12 @@ class Transient:
         return self.loads + inverse * np.array(inertia)
 
 
-def relax_to_periodic(
-    joint: Joint, wear_depth: FloatArray, start: State, start_joint: Joint, run: Run
-) -> State | Failure:
+def relax_to_periodic(joint: Joint, worn: FloatArray, start: State, start_joint: Joint, run: Run) -> State | Failure:
     """Stable periodic state of `joint` to which the structure relaxes in time from a state of `start_joint`.
 
     start_joint: differs from the joint in frequency and load alone.
-    wear_depth (n_contact,): m, constant. A start without excitation leads to the state that builds up from rest.
+    worn (2, n_contact): constant depths, m, and dissipated energies, J/m2. A start without excitation leads to the
+    state that builds up from rest.
     Returns the state, or ADRIFT (the mean positions run away: only friction holds the parts), UNSTABLE (the motion does
     not leave an unstable periodic state) or UNSETTLED (it does not settle within `SEARCH_ITERATIONS`).
     """
@@ -127,7 +126,7 @@ def relax_to_periodic(
     grows = False
     while left > 0 and length >= SHORTEST_STEP and not budget.exhausted:
         inverse = 1.0 / (length * period)
-        balance = Balance(transient.step(motion, inverse), history, wear_depth)
+        balance = Balance(transient.step(motion, inverse), history, worn[0], energy=worn[1])
         before = budget.iterations
         end = run.state(balance, predicted, most=NEAR_ITERATIONS)
         left -= max(budget.iterations - before, 1)
@@ -152,7 +151,7 @@ def relax_to_periodic(
             tried = change
             before = budget.iterations
             # with ten iterations two of 64 samples of the dovetail (16 pairs, 212.45 Hz) end as `march_failed`
-            found = run.state(Balance(joint, history, wear_depth), predicted)
+            found = run.state(Balance(joint, history, worn[0], energy=worn[1]), predicted)
             left -= budget.iterations - before
             if found is not None and not run.is_stable(joint, found.evaluation):
                 grows = True

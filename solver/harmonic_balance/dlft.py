@@ -9,6 +9,9 @@ is the only coupled equation. With the implicit scheme `W = W_k + h g(p)`, Eqs. 
 The wear rate of a pair depends on p of this pair alone, so that W is eliminated pair by pair:
 
     dR/dp = Z_r [(I - dlambda/dp) / eps + d W/dp] + dlambda/dp                                          (16)-(18)
+
+So is the energy that friction has dissipated, `e = e_k + h mu(e) S / alpha`, where friction mu, flexibility c of the
+contact (`u` in (8) is then `u + c lambda`) or wear coefficient change with it (`Evolution`).
 """
 
 from __future__ import annotations
@@ -19,12 +22,18 @@ from functools import cached_property
 import numpy as np
 from numba import njit
 
-from solver.contact.element import Marched
+from solver.contact.coulomb import friction_limit
+from solver.contact.element import Element, Marched
 from solver.contact.wear_law import ARCHARDS_WORK, WearingWork
-from solver.model import ComplexArray, FloatArray, IntArray
+from solver.model import ComplexArray, ContactInterface, FloatArray, IntArray
 from solver.packing import packable
 from solver.settings import NEGLIGIBLE
 from solver.structure.joint import Joint
+
+MOST_MARCHES = 12
+SAME_FRICTION = 1e-13
+"""Most marches until the friction of an evolving contact agrees with the energy that it dissipates, and by how much.
+Four are usual."""
 
 
 @dataclass(frozen=True)
@@ -35,6 +44,8 @@ class Balance:
       with this history, from which that of the state has slowly come; None where it was always the same.
     - wear_depth (n_contact,): depth without the growth, m; constant through the period, Eq. (6). Default: 0.
     - wear_gain (n_contact,): growth of the depth per wearing work, m/J; 0 where W is given. wearing: this work.
+    - energy, energy_gain (n_contact,): in the same way, the energy that friction has dissipated, J/m2, and its growth
+      over the work of friction, 1/m2.
     """
 
     joint: Joint
@@ -43,6 +54,8 @@ class Balance:
     wear_gain: FloatArray | float = 0.0
     wearing: WearingWork = ARCHARDS_WORK
     before_t: FloatArray | None = None
+    energy: FloatArray = field(default_factory=lambda: np.zeros(1))
+    energy_gain: FloatArray | float = 0.0
 
     def predict(self, displacement_h: FloatArray, force_h: FloatArray) -> FloatArray:
         """Predicted force (n_rel, m), N, Eq. (10), of a motion, m, and a contact force, N, both (n_contact, 3, m)."""
@@ -57,13 +70,15 @@ class Balance:
         pairs = joint.to_pairs(predicted_h)
         given = ~joint.contact.has_normal
         pairs[given, 0, 0] = joint.contact.normal_load[given]
-        marched = joint.law.march(pairs, self.history, self.before_t)
+        contact, marched, energy = self._marched(pairs)
         worn = marched.slip_work, marched.force_h[:, 0, 0], self.wear_depth
-        wear_depth = self.wear_depth + self.wearing.growth(self.wear_gain, *worn)
+        wearing, gain = self.wearing.rubbing(contact.friction), self.wear_gain * contact.wear_factor[0]
+        wear_depth = self.wear_depth + wearing.growth(gain, *worn)
         displacement_h = joint.law.motion(pairs - marched.force_h)
         displacement_h[:, 0, 0] += wear_depth + joint.contact.gap
         displacement_h[:, 1:, 0] += joint.law.origin(self.history)
-        motion, force = joint.to_relative(displacement_h), joint.to_relative(marched.force_h)
+        moved = displacement_h + contact.flexibility[0][:, :, None] * marched.force_h
+        motion, force = joint.to_relative(moved), joint.to_relative(marched.force_h)
         return Evaluation(
             **vars(marched),
             predicted_h=predicted_h,
@@ -72,16 +87,69 @@ class Balance:
             start_history=joint.law.started_from(marched, self.history),
             displacement_h=displacement_h,
             wear_depth=wear_depth,
+            energy=energy,
         )
 
+    def _marched(self, pairs: FloatArray) -> tuple[ContactInterface, Marched, FloatArray]:
+        """Contact at the end of the step, the period under a predicted force (n_contact, 3, m), and the energy.
+
+        The friction depends on the energy that it dissipates itself: by the secant method, pair by pair.
+        """
+        unworn, last = self.joint.model.contact, None
+        energy = np.broadcast_to(self.energy, unworn.area.shape)
+        for _ in range(MOST_MARCHES):
+            contact = unworn.after(energy)
+            law, before_t = self._law(contact)
+            marched = law.march(pairs, self.history, before_t)
+            after = self.energy + self.energy_gain * friction_limit(contact.friction, marched.slip_work)
+            found = unworn.after(after)
+            if np.abs(found.friction - contact.friction).max(initial=0.0) <= SAME_FRICTION:
+                return found, marched, after
+            rise = np.zeros_like(after)
+            if last is not None:
+                moved = energy - last[0]
+                rise = np.divide(after - last[1], moved, out=rise, where=moved != 0.0)
+            last, energy = (energy, after), energy + (after - energy) / np.where(rise < 0.9, 1.0 - rise, 1.0)
+        # no state: the residual is not known
+        return found, marched, np.full_like(after, np.nan)
+
+    def _law(self, contact: ContactInterface) -> tuple[Element, FloatArray | None]:
+        """The law with the friction of a contact, and the predicted force before (n_contact, 3, N), with friction discs
+        of the size that they had there.
+        """
+        now, before = contact.friction, self.joint.contact.friction
+        if now is before:
+            return self.joint.law, self.before_t
+        before_t = None if self.before_t is None else self.before_t.copy()
+        if before_t is not None:
+            before_t[:, 0] *= np.divide(before, now, out=np.ones_like(now), where=now > 0.0)[:, None]
+        return self.joint.law.rubbing(now), before_t
+
     def linearise(self, at: Evaluation) -> Linearisation:
-        """Exact derivative of the residual, Eqs. (16)-(18), including wear and the periodicity of friction."""
+        """Exact derivative of the residual, Eqs. (16)-(18), including wear, evolution, and periodicity of friction."""
         if self.before_t is None and at.slid.any():
             at = replace(at, slid=np.zeros_like(at.slid))
-        force_tangent, slip_work_tangent = self.joint.law.tangent(at, self.history, self.before_t)
-        tangents = slip_work_tangent, force_tangent[:, 0, :]
-        growth_tangent = self.wearing.growth_tangent(self.wear_gain, worn_by(at), *tangents)
-        return Linearisation(self.joint, at, force_tangent, growth_tangent)
+        contact = self.joint.model.contact.after(at.energy)
+        law, before_t = self._law(contact)
+        force_tangent, work_tangent, by_friction = law.tangent(at, self.history, before_t)
+        friction, slope, gain = contact.friction, contact.friction_slope, self.energy_gain
+        back = gain * slope * (at.slip_work + friction * by_friction[:, -1])
+        energy_tangent = (gain * friction / (1.0 - back))[:, None] * work_tangent
+        evolving = np.flatnonzero(slope)
+        changed = slope[evolving, None] * energy_tangent[evolving]
+        force_tangent[evolving] += by_friction[evolving, :-1, None] * changed[:, None]
+        work_tangent[evolving] += by_friction[evolving, -1:] * changed
+        wearing, (factor, factor_slope) = self.wearing.rubbing(friction), contact.wear_factor
+        pushed = factor_slope * wearing.work(*worn_by(at)) + factor * slope * wearing.by_friction(at.slip_work)
+        growth_tangent = wearing.growth_tangent(
+            self.wear_gain * factor,
+            worn_by(at),
+            (work_tangent, force_tangent[:, 0, :]),
+            (self.wear_gain * pushed)[:, None] * energy_tangent,
+        )
+        flexibility, softens = contact.flexibility
+        eased = (softens[:, :, None] * at.force_h).reshape(energy_tangent.shape)
+        return Linearisation(self.joint, at, force_tangent, growth_tangent, flexibility, eased, energy_tangent)
 
 
 @packable
@@ -91,8 +159,8 @@ class Evaluation(Marched):
 
     - predicted_h, residual (n_rel, 2H+1): N. scale: of the residual in the static and in the other harmonics, N.
     - start_history (n_contact, n_history): with which the period begins, m.
-    - displacement_h (n_contact, 3, 2H+1): motion, m.
-    - wear_depth (n_contact,): m; at the end of the step in an implicit step.
+    - displacement_h (n_contact, 3, 2H+1): motion of the contact, m; that of the structure is `Joint.motion`.
+    - wear_depth, energy (n_contact,): m, J/m2; at the end of the step in an implicit step.
     """
 
     predicted_h: FloatArray
@@ -101,6 +169,12 @@ class Evaluation(Marched):
     start_history: FloatArray
     displacement_h: FloatArray
     wear_depth: FloatArray
+    energy: FloatArray = field(default_factory=lambda: np.full(1, np.nan))
+
+    @property
+    def slow(self) -> FloatArray:
+        """What changes slowly (2, n_contact): wear depth, m, and dissipated energy, J/m2."""
+        return np.array([self.wear_depth, np.broadcast_to(self.energy, self.wear_depth.shape)])
 
     def scaled_residual(self, scale: tuple[float, float] | None = None) -> float:
         """Euclidean norm of the residual, with the static harmonic and the other harmonics divided by their scales."""
@@ -128,7 +202,9 @@ def _residual_scale(reduced_force: FloatArray, contact_force: FloatArray) -> tup
 class Linearisation:
     """`dR/dp = Z_r motion_tangent + force_tangent` at a point, both (n_contact, 3m, 3m) blocks of the pairs, m = 2H+1.
 
-    growth_tangent (n_contact, 3m): derivative of the wear depth, m/N, which is a part of the static normal motion.
+    growth_tangent, energy_tangent (n_contact, 3m): derivatives of the wear depth, m/N, which is a part of the static
+    normal motion, and of the dissipated energy, 1/m2. flexibility (n_contact, 3): motion of the structure over contact
+    force, m/N, beside that of the contact; eased (n_contact, 3m): that motion over the dissipated energy, m3/J.
     Columns of pairs that stick during the whole period are those of the identity: only `active` pairs are coupled.
     """
 
@@ -136,20 +212,25 @@ class Linearisation:
     at: Marched
     force_tangent: FloatArray
     growth_tangent: FloatArray
+    flexibility: FloatArray
+    eased: FloatArray
+    energy_tangent: FloatArray
 
     @property
     def motion_tangent(self) -> FloatArray:
-        """`du/dp` (n_contact, 3m, 3m), m/N, Eq. (12), with the wear."""
+        """`du/dp` (n_contact, 3m, 3m), m/N, Eq. (12), with the wear and the flexibility of the contact."""
         size = self.force_tangent.shape[1]
-        correction = (np.eye(size) - self.force_tangent).reshape(-1, 3, size // 3, size)
-        tangent = self.joint.law.motion(correction).reshape(-1, size, size)
+        transmitted = self.force_tangent.reshape(-1, 3, size // 3, size)
+        correction = np.eye(size).reshape(3, size // 3, size) - transmitted
+        tangent = self.joint.law.motion(correction) + self.flexibility[:, :, None, None] * transmitted
+        tangent = tangent.reshape(-1, size, size) + self.eased[:, :, None] * self.energy_tangent[:, None, :]
         tangent[:, 0, :] += self.growth_tangent
         return tangent
 
     @cached_property
     def active(self) -> IntArray:
         """Pairs whose motion depends on their predicted force."""
-        return np.flatnonzero(~self.at.stuck)
+        return np.flatnonzero(~self.at.stuck | self.flexibility.any(axis=1))
 
     @cached_property
     def active_rows(self) -> IntArray:
@@ -169,7 +250,8 @@ class Linearisation:
     def rest_and_motion(self, step: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Part of a step (n_rel, m), N, that the pairs do not transmit, and their motion (n_rel, m), m."""
         joint = self.joint
-        blocks = self.force_tangent, joint.law.compliance, self.growth_tangent
+        by_energy = self.eased, self.energy_tangent
+        blocks = self.force_tangent, joint.law.compliance, self.growth_tangent, self.flexibility, by_energy
         return untransmitted(np.ascontiguousarray(step), joint.contact.pair_rows, self.active, *blocks)
 
     def dense(self, pairs: IntArray, width: int | None = None) -> FloatArray:
@@ -210,13 +292,15 @@ def untransmitted(
     force_tangent: FloatArray,
     compliance: ComplexArray,
     growth: FloatArray,
+    flexibility: FloatArray,
+    by_energy: tuple[FloatArray, FloatArray],
 ) -> tuple[FloatArray, FloatArray]:
     """Part of a predicted force (n_rel, m), N, that the pairs do not transmit, and their motion (n_rel, m), m.
 
     rows (n_contact, 3): row of each component, -1 for none. compliance (n_contact, 3, H+1): displacement per force in
-    each harmonic, m/N. The others as in `Linearisation`.
+    each harmonic, m/N. by_energy: `eased` and `energy_tangent`. The others as in `Linearisation`.
     """
-    m = step.shape[1]
+    m, (eased, energy_tangent) = step.shape[1], by_energy
     rest, motion = np.zeros(step.shape), np.zeros(step.shape)
     own, passed, grown = np.empty((3 * m, 1)), np.empty((3 * m, 1)), np.empty((1, 1))
     for pair in active:
@@ -239,4 +323,10 @@ def untransmitted(
             if i == 0:
                 np.dot(growth[pair : pair + 1], own, grown)
                 motion[row, 0] += grown[0, 0]
+            for k in range(m):
+                motion[row, k] += flexibility[pair, i] * passed[i * m + k, 0]
+        np.dot(energy_tangent[pair : pair + 1], own, grown)
+        for i in range(3):
+            for k in range(m if rows[pair, i] >= 0 else 0):
+                motion[rows[pair, i], k] += eased[pair, i * m + k] * grown[0, 0]
     return rest, motion

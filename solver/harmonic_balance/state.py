@@ -41,7 +41,8 @@ class State:
 
     def joint(self, of: Case) -> Joint:
         """The joint of the state in a case; the last ones are cached."""
-        return _joint(of, self.resolution, self.hold, self.omega, self.excitation_amplitude)
+        joint = _joint(of, self.resolution, self.hold, self.omega, self.excitation_amplitude)
+        return joint.after(self.evaluation.energy)
 
 
 @lru_cache(maxsize=CACHED_STRUCTURES)
@@ -94,7 +95,8 @@ def transfer(case: Case, state: State, joint: Joint, *, with_tail: bool = False)
     tangential, end = evaluation.displacement_h[:, 1:], np.array([-2.0 * np.pi / evaluation.force_t.shape[2]])
     begun = joint.law.begun_at(tangential[:, :, 0], (tangential @ synthesis(known, end))[:, :, 0])
     same = state.case(case).penalty.inertial == joint.penalty.inertial
-    balance = Balance(joint, np.where(same[:, None], evaluation.start_history, begun), evaluation.wear_depth)
+    history = np.where(same[:, None], evaluation.start_history, begun)
+    balance = Balance(joint.after(evaluation.energy), history, evaluation.wear_depth, energy=evaluation.energy)
     motion_h, force_h = (
         change_orders(joint.to_relative(part), known, orders)
         for part in (evaluation.displacement_h, evaluation.force_h)
@@ -112,7 +114,7 @@ def transfer(case: Case, state: State, joint: Joint, *, with_tail: bool = False)
 
 def first_response(joint: Joint, at: Evaluation) -> ComplexArray:
     """First harmonic of the responses (n_response,), m, of a state."""
-    return to_complex(joint.structure.response_h(joint.to_relative(at.displacement_h)))[:, 0]
+    return to_complex(joint.structure.response_h(joint.motion(at)))[:, 0]
 
 
 def largest_responses(joint: Joint, evaluation: Evaluation) -> FloatArray:
@@ -120,7 +122,7 @@ def largest_responses(joint: Joint, evaluation: Evaluation) -> FloatArray:
 
     With the tail of friction on rigid ground: else the error of the peak falls as the square of the highest harmonic.
     """
-    response_h = joint.structure.response_h(joint.to_relative(evaluation.displacement_h))
+    response_h = joint.structure.response_h(joint.motion(evaluation))
     response_t = response_h @ build_basis(joint.basis.orders, FINE_SAMPLES).synthesis
     orders = tail_orders(joint)
     if orders:

@@ -198,7 +198,7 @@ class LoadingPath(Path[State]):
             # natural steps may have passed the start of an unstable part: then the search begins before them
             end = state if arrived else end
             beyond = end.parameter + float(np.clip(target - end.parameter, -fine, fine))
-            settled = relax_to_periodic(self.joint_at(beyond), end.evaluation.wear_depth, end, self.joint_of(end), run)
+            settled = relax_to_periodic(self.joint_at(beyond), end.evaluation.slow, end, self.joint_of(end), run)
             if isinstance(settled, Failure):
                 return settled
             # a fold with a smaller change is a corner of the branch

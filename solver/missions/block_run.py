@@ -37,7 +37,7 @@ that continues.
 class BlockResult:
     """A block that was computed once.
 
-    growth (n_contact,): depth worn in the block, m.
+    growth, dissipated (n_contact,): depth worn in the block, m, energy that its friction dissipates, J/m2.
     response, response_peak (2, n_response): complex first harmonic and largest magnitude at start and end, m.
     slope (n_contact, n_contact): derivative of the growth by the depth before, 1; None if not asked for.
     response_error, growth_error: estimated relative errors.
@@ -50,6 +50,7 @@ class BlockResult:
     """
 
     growth: FloatArray
+    dissipated: FloatArray
     response: ComplexArray
     response_peak: FloatArray
     slope: FloatArray | None = None
@@ -69,7 +70,8 @@ class BlockResult:
 class BlockInput:
     """What a block is computed with.
 
-    mission, block: the mission, and the block of it. depth (n_contact,): m, worn before the block.
+    mission, block: the mission, and the block of it. worn (2, n_contact): depth, m, and dissipated energy, J/m2, before
+        the block.
     deadline: CPU time of the thread, s, at which the time of the history is over.
     before: last state of the block before, which the block continues; None for a block with a sweep of its own.
     earlier, guide: of this block in an earlier mission, and in the history for its reference solution; else None.
@@ -79,13 +81,18 @@ class BlockInput:
 
     mission: MissionRequest
     block: Block
-    depth: FloatArray
+    worn: FloatArray
     deadline: float = math.inf
     before: StartState | None = None
     earlier: Earlier = None
     guide: Guide | None = None
     with_slope: bool = False
     with_switching: bool = True
+
+    @property
+    def depth(self) -> FloatArray:
+        """Depth worn before the block (n_contact,), m."""
+        return np.asarray(self.worn[0])
 
     @property
     def passage(self) -> Passage:
@@ -95,8 +102,8 @@ class BlockInput:
 
     @property
     def model(self) -> ReducedModel:
-        """The model whose pairs the depth has opened."""
-        contact = self.block.model.contact
+        """The model whose pairs the depth has opened, and whose contact the energy has changed."""
+        contact = self.block.model.contact.after(self.worn[1])
         return replace(self.block.model, contact=replace(contact, gap=contact.gap + self.depth))
 
     @property
@@ -152,6 +159,7 @@ def run_block(given: BlockInput) -> BlockResult | Failure:
     motion, force, history = state.at.displacement_h, state.at.force_h, state.point.next_history
     return BlockResult(
         growth=depth[-1],
+        dissipated=values["dissipated_energy"][-1],
         response=values["response"],
         response_peak=values["response_peak"],
         slope=slope,

@@ -101,7 +101,8 @@ class MissionProblem:
         )
         if not done:
             # the rate and the values of the unworn joint are those of the first mission
-            course = replace(course, nodes=(replace(step.node, count=0.0, depth=course.nodes[0].depth),))
+            nothing = course.nodes[0].depth
+            course = replace(course, nodes=(replace(step.node, count=0.0, depth=nothing, energy=nothing),))
         return after, course.after(step.node)
 
     def attempt(self, here: _Here, length: float) -> MissionStep | None:
@@ -109,7 +110,8 @@ class MissionProblem:
         nodes, rtol = here.course.nodes, self.mission.settings.rtol * (1.0 if self.history is None else RTOL_RATIO)
         number = int(nodes[-1].count + length)
         run_mission = partial(self._mission, here, number, number in self._tested)
-        step = attempt_step(nodes, int(length), self.mission.area, run_mission, SHARE_OF_CAUSE * rtol)
+        contact = self.mission.blocks[0].model.contact
+        step = attempt_step(nodes, int(length), contact, run_mission, SHARE_OF_CAUSE * rtol)
         if isinstance(step, MissionStep):
             return step
         here.failure = step
@@ -128,8 +130,8 @@ class MissionProblem:
         done = int(course.ends[-1])
         if done in self._tested:
             return None
-        depth = course.depths[-1].reshape(-1, self.mission.area.size).sum(axis=0)
-        behind = self._mission(_Here(state, course, list(state.sweeps)), done + 1, True, depth, False)
+        worn = course.nodes[-1].slow.reshape(2, -1, self.mission.area.size).sum(axis=1)
+        behind = self._mission(_Here(state, course, list(state.sweeps)), done + 1, True, worn, False)
         if isinstance(behind, Failure):
             return behind
         if all(math.isfinite(each.inaccurate) for each in behind):
@@ -137,9 +139,11 @@ class MissionProblem:
         return Failure(Outcome.INACCURATE, f"whether the joint vibrates stably behind mission {done} is not known")
 
     def _mission(
-        self, here: _Here, number: int, tested: bool, depth: FloatArray, with_slopes: bool
+        self, here: _Here, number: int, tested: bool, worn: FloatArray, with_slopes: bool
     ) -> tuple[BlockResult, ...] | Failure:
-        """Compute the blocks of a mission. number: from 1 on. depth (n_contact,): before the mission, m."""
+        """Compute the blocks of a mission. number: from 1 on. worn (2, n_contact): depth, m, and dissipated energy,
+        J/m2, before the mission.
+        """
         mission, before, budget = self.mission, here.state.end, self.run.budget
         guides: tuple[Guide | None, ...] = (None,) * len(mission.blocks)
         if self.history is not None:
@@ -149,7 +153,7 @@ class MissionProblem:
         for place, (block, guide, earlier) in enumerate(zip(mission.blocks, guides, here.sweeps, strict=True)):
             run = run_passage if isinstance(block.frequency, Passage) else run_block
             last = before if block.way == "continue" else None
-            given = BlockInput(mission, block, depth, budget.deadline, last, earlier, guide, with_slopes, tested)
+            given = BlockInput(mission, block, worn, budget.deadline, last, earlier, guide, with_slopes, tested)
             result = guarded(partial(run, given))
             if isinstance(result, Failure):
                 where = f"in mission {number}, {mission.called(place)}"
@@ -157,7 +161,7 @@ class MissionProblem:
             results.append(result)
             here.sweeps[place] = result.sweep
             budget.iterations += result.iterations
-            depth, before = depth + result.growth, result.last
+            worn, before = worn + np.array([result.growth, result.dissipated]), result.last
         return tuple(results)
 
 
@@ -165,10 +169,10 @@ def unworn_course(mission: MissionRequest) -> Course:
     """The course before the first mission, whose blocks have no values yet."""
     nothing = np.zeros(mission.area.size)
     unknown = np.full((2, len(mission.blocks[0].model.response_names)), np.nan)
-    results = (BlockResult(nothing, unknown.astype(complex), unknown),) * len(mission.blocks)
+    results = (BlockResult(nothing, nothing, unknown.astype(complex), unknown),) * len(mission.blocks)
     course = Course(mission.area, np.array(mission.missions, np.float64), mission.until)
     row = np.tile(nothing, len(results))
-    return course.after(Node(0.0, row, row, values_of(results) | {"local": nothing}))
+    return course.after(Node(0.0, row, row, values_of(results) | {"local": nothing}, (), row, row))
 
 
 def integrate_missions(
@@ -214,6 +218,8 @@ def _assembled(mission: MissionRequest, solution: Solution) -> MissionHistory:
         worn_volume_error=whole.worn_volume,
         wear_depth=depth,
         wear_depth_error=whole.wear_depth,
+        dissipated_energy=both.values["dissipated_energy"],
+        dissipated_energy_error=whole.dissipated_energy,
         block_volume=values["wear_depth"].reshape(counts.size, len(blocks), -1) @ area,
         block_volume_error=np.array([each.worn_volume for each in blocks]).T,
         reference_volume=both.other("wear_depth") @ area,
@@ -240,7 +246,8 @@ def _compare(solution: Solution, chosen: slice, counts: FloatArray) -> tuple[Com
 def _of_blocks(chosen: slice, area: FloatArray, values: dict[str, Any]) -> dict[str, Any]:
     """Wear of some blocks together, and their responses, in the terms of a wear history."""
     n = len(values["local"])
-    growth, rates = (values[name].reshape(n, -1, area.size) for name in ("wear_depth", "depth_rate"))
+    of_pairs = ("wear_depth", "depth_rate", "dissipated_energy")
+    growth, rates, energy = (values[name].reshape(n, -1, area.size) for name in of_pairs)
     rates = rates[:, chosen]
     volumes = rates @ area
     weighted = absolute(values["growth_error"][:, chosen], volumes).sum(axis=1)
@@ -252,6 +259,7 @@ def _of_blocks(chosen: slice, area: FloatArray, values: dict[str, Any]) -> dict[
     first = rate_error[0] if np.isfinite(rate_error[0]) else 0.0
     return {
         "wear_depth": depth,
+        "dissipated_energy": energy[:, chosen].sum(axis=1),
         "depth_rate": rates.sum(axis=1),
         "wear_rate": rates.sum(axis=1) @ area,
         "wear_rate_error": rate_error,

@@ -83,6 +83,7 @@ class MissionHistory(Ended, Presented):
     """A joint over its missions, at `n_output` numbers of missions. Values not reached are NaN, all errors estimated.
 
     - missions (n_output,); worn_volume (n_output,), m3, wear_depth (n_output, n_contact), m.
+    - dissipated_energy, dissipated_energy_error (n_output, n_contact): by friction, J/m2, over the area of each pair.
     - worn_volume_error, relative, wear_depth_error, m: by the steps over missions, the integration of each block and
       their propagation, harmonics, samples and start states; 0 where nothing has worn.
     - block_volume (n_output, n_block): m3, their sum is `worn_volume`; block_volume_error: relative.
@@ -107,6 +108,8 @@ class MissionHistory(Ended, Presented):
     worn_volume_error: FloatArray
     wear_depth: FloatArray
     wear_depth_error: FloatArray
+    dissipated_energy: FloatArray
+    dissipated_energy_error: FloatArray
     block_volume: FloatArray
     block_volume_error: FloatArray
     response_begin: ComplexArray

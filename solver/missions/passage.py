@@ -59,13 +59,14 @@ steady states, and the estimated error: slider 0.999 and 3.4 % at 1, 0.995 and 9
 class SweptState:
     """The state at a frequency, Hz, of a passage.
 
-    density (n_contact,): wear in one passage over frequency, m/Hz.
+    density, heat (n_contact,): wear and dissipated energy in one passage over frequency, m/Hz and J/m2/Hz.
     response, peak (n_response,): complex first harmonic and largest magnitude over a period, m.
     """
 
     frequency: float
     start: StartState
     density: FloatArray
+    heat: FloatArray
     response: ComplexArray
     peak: FloatArray
 
@@ -103,6 +104,7 @@ def run_passage(given: BlockInput) -> BlockResult | Failure:
     bad = [of for each, of in zip(starts, largest, strict=True) if each.outcome is Outcome.INACCURATE or math.isinf(of)]
     return BlockResult(
         growth=growth,
+        dissipated=_by_trapezoids(ascending, [state.heat for state in ascending]).sum(axis=0),
         response=np.array([state.response for state in ends]),
         response_peak=np.array([state.peak for state in ends]),
         slope=slope if given.with_slope else None,
@@ -152,9 +154,13 @@ def wear_in_order(states: Sequence[SweptState], slopes: Iterable[FloatArray]) ->
 
 def parts_of(states: Sequence[SweptState]) -> FloatArray:
     """Wear (n, n_contact), m, that belongs to each of the frequencies, ascending, by the trapezoidal rule."""
+    return _by_trapezoids(states, [state.density for state in states])
+
+
+def _by_trapezoids(states: Sequence[SweptState], density: Sequence[FloatArray]) -> FloatArray:
+    """Parts (n, n_contact) of the integral of a density (n, n_contact) over the frequencies of states."""
     width = np.diff([state.frequency for state in states])
-    density = np.array([state.density for state in states])
-    return np.asarray(0.5 * (np.append(0.0, width) + np.append(width, 0.0))[:, None] * density)
+    return np.asarray(0.5 * (np.append(0.0, width) + np.append(width, 0.0))[:, None] * np.array(density))
 
 
 def find_states(given: BlockInput) -> Swept | Failure:
@@ -237,9 +243,9 @@ def states_at(given: BlockInput, frequencies: FloatArray) -> list[SweptState] | 
             raise OutOfTimeError
         wearing, state = given.wearing_joint(start)
         joint, frequency = wearing.joint_of(state), float(frequencies[index])
-        density = state.rate * frequency / given.passage.rate
-        response = first_response(joint, state.at)
-        states.append(SweptState(frequency, start, density, response, largest_responses(joint, state.at)))
+        density, heat = (each * frequency / given.passage.rate for each in (state.rate, state.energy_rate))
+        vibration = first_response(joint, state.at), largest_responses(joint, state.at)
+        states.append(SweptState(frequency, start, density, heat, *vibration))
     return states
 
 

@@ -29,13 +29,15 @@ import numpy as np
 
 from solver.harmonic_balance.state import Failure
 from solver.missions.block_run import BlockResult
-from solver.model import FloatArray
+from solver.model import ContactInterface, FloatArray
 from solver.outcome import absolute
 from solver.wear.slow_time import Node
 from solver.wear.step import allowed_error
 
 RunMission = Callable[[FloatArray, bool], tuple[BlockResult, ...] | Failure]
-"""Computes the blocks of a mission: depth before (n_contact,), m, and whether slopes are asked for."""
+"""Computes the blocks of a mission: depths, m, and dissipated energies, J/m2, before (2, n_contact), and whether slopes
+are asked for.
+"""
 
 
 @dataclass(frozen=True)
@@ -48,30 +50,39 @@ class MissionStep:
 
 
 def attempt_step(
-    nodes: Sequence[Node], length: int, area: FloatArray, run_mission: RunMission, share: float
+    nodes: Sequence[Node], length: int, contact: ContactInterface, run_mission: RunMission, share: float
 ) -> MissionStep | Failure:
     """A step over missions; over more than one from the third mission on.
 
     nodes: ends of steps so far, of which the last missions were computed, with the depths and rates of all blocks in
         one row, and with values (n_block, ...) by their names in `BlockResult`, and `local` (n_contact,): sum of the
-        errors of steps and blocks, m. area (n_contact,): m2. share: as in `allowed_error`.
+        errors of steps and blocks, m. contact: unworn. share: as in `allowed_error`.
     """
-    now, unit = nodes[-1], np.eye(area.size)
-    base, rate_before = now.depth.reshape(-1, area.size), now.rate.reshape(-1, area.size).sum(axis=0)
-    depth_now = first = ahead = base.sum(axis=0)
-    factor = error_factor = 0.0
+    area, now = contact.area, nodes[-1]
+    unit, rate_before = np.eye(area.size), now.rate.reshape(-1, area.size).sum(axis=0)
+    # first axis: depths and dissipated energies
+    *earlier, slow = (node.slow.reshape(2, -1, area.size) for node in nodes[-3:])
+    base = slow
+    first = ahead = slow.sum(axis=1)
+    depth_now, factor, error_factor = first[0], 0.0, 0.0
     if length > 1:
-        past, before, _ = (node.depth.reshape(-1, area.size) for node in nodes[-3:])
+        past, before = earlier
         h, (b, a) = float(length), np.diff([node.count for node in nodes[-3:]])
         last = (base - before) / a
         turn = (last - (before - past) / b) / (a + b)
-        first, ahead = ((base + at * last + at * (at + a) * turn).sum(axis=0) for at in (h - 1.0, h))
+        first, ahead = ((base + at * last + at * (at + a) * turn).sum(axis=1) for at in (h - 1.0, h))
         base = base + (h - 1.0) * h / (2.0 * h - 1.0 + a) * last
         factor = float((h - 1.0) * (h - 1.0 + a) / (2.0 * h - 1.0 + a))
-        first, error_factor = np.maximum(first, base.sum(axis=0)), float(factor / (h + a + b))
+        first, error_factor = np.maximum(first, base.sum(axis=1)), float(factor / (h + a + b))
     results = run_mission(first, length > 1)
     if isinstance(results, Failure):
         return results
+    energy_rates = np.array([each.dissipated for each in results])
+    energy = base[1] + (factor + 1.0) * energy_rates
+    # the mission was computed with the contact at an energy that was extrapolated
+    energy_error = np.abs(base[1].sum(axis=0) + factor * energy_rates.sum(axis=0) - first[1])
+    energy_error += np.abs(error_factor * (energy.sum(axis=0) - ahead[1]))
+    (base, _), (first, _), (ahead, _) = base, first, ahead
     rates, error = np.array([each.growth for each in results]), np.zeros(area.size)
     if length > 1:
         whole, rate, least = unit, rates.sum(axis=0), base.sum(axis=0)
@@ -91,8 +102,13 @@ def attempt_step(
     values = values_of(results)
     of_blocks = absolute(values["growth_error"][:, None], rates).sum(axis=0)
     values["local"] = now.values["local"] + error + length * of_blocks
-    end = Node(now.count + length, growth.ravel(), rates.ravel(), values, tuple(each.guide for each in results))
+    guides = tuple(each.guide for each in results)
+    slow_now = energy.ravel(), energy_rates.ravel()
+    end = Node(now.count + length, growth.ravel(), rates.ravel(), values, guides, *slow_now)
     ratio = float(error @ area) / most
+    if contact.evolution and length > 1:
+        heat = float(slow[1].sum(axis=0) @ area), float(energy.sum(axis=0) @ area)
+        ratio = max(ratio, float(energy_error @ area) / allowed_error(share, *heat, now.count, length))
     return MissionStep(end, results, math.inf if math.isnan(ratio) else ratio)
 
 

@@ -199,7 +199,7 @@ class _AtAmplitude(BorderedProblem):
     def evaluate(self, predicted_h: FloatArray, values: FloatArray) -> Bordered:
         balance = Balance(self.mode.joint_with(values), self.history, before_t=self.before_t)
         at = balance.evaluate(predicted_h)
-        shape = first_motion(balance.joint, balance.joint.to_relative(at.displacement_h), float(values[2]))
+        shape = first_motion(balance.joint, balance.joint.motion(at), float(values[2]))
         real, imaginary, square = self._products(shape, shape)
         errors = np.array([real - values[2] / self.amplitude, imaginary, 0.5 * (square - 1.0)])
         return Bordered(balance, at, values, errors, extra=shape)

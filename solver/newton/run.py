@@ -261,13 +261,13 @@ class Run:
         """False where a state has an odd number of real Floquet multipliers beyond +1 (`solver.stability.floquet`) at
         its wear depth, as the vibration is fast and the wear is slow; with more samples, too (`SAMPLES_OF_SIGN`).
         """
-        if self.solver.determinant_sign(Balance(joint, at.start_history).linearise(at)) >= 0.0:
+        if self.solver.determinant_sign(Balance(joint, at.start_history, energy=at.energy).linearise(at)) >= 0.0:
             return True
         # the predicted force of masses on rigid ground depends on the length of a sample
         if joint.law.rate_dependent:
             return False
         finer = replace(joint, basis=build_basis(joint.basis.orders, SAMPLES_OF_SIGN * joint.basis.n_samples))
-        sampled = Balance(finer, at.start_history, at.wear_depth)
+        sampled = Balance(finer, at.start_history, at.wear_depth, energy=at.energy)
         tangent = sampled.linearise(sampled.evaluate(at.predicted_h))
         return bool(JacobianSolver().determinant_sign(tangent) >= 0.0)
 

@@ -73,6 +73,9 @@ class WearHistory(Ended, Presented):
     """A point of a study on the slow time scale, at `n_output` cycle counts; not reached: NaN, whole numbers 0.
 
     - cycles (n_output,); worn_volume, m3, wear_rate, m3 per cycle; wear_depth (n_output, n_contact), m.
+    - dissipated_energy, dissipated_energy_error (n_output, n_contact): by friction, J/m2, over the area of each pair.
+      pair_friction, pair_stiffness (n_output, n_contact): what an evolving contact has; the stiffness, N/m3, inf where
+      it does not evolve.
     - mean_pressure, Pa, slip_range, m, open_fraction (n_output, n_contact): of a period.
     - friction_use (n_output,): largest friction force of any pair over its limit, at any time.
     - friction_power (n_output, n_contact): power density of friction, W/m2, of a period.
@@ -110,6 +113,7 @@ class WearHistory(Ended, Presented):
     worn_volume: FloatArray
     wear_rate: FloatArray
     wear_depth: FloatArray
+    dissipated_energy: FloatArray
     mean_pressure: FloatArray
     slip_range: FloatArray
     open_fraction: FloatArray
@@ -134,6 +138,9 @@ class WearHistory(Ended, Presented):
     samples_used: IntArray
     worn_volume_error: FloatArray
     wear_depth_error: FloatArray
+    dissipated_energy_error: FloatArray
+    pair_friction: FloatArray
+    pair_stiffness: FloatArray
     excitation_frequency: FloatArray
     excitation_frequency_error: FloatArray
     reference_volume: FloatArray

@@ -49,7 +49,7 @@ def report_state(
     estimated relative error `resonance_error`. Errors are those by the harmonics and samples of the state.
     """
     loop_displacement, loop_force = contact_loops(joint, evaluation, loops)
-    response_h = joint.structure.response_h(joint.to_relative(evaluation.displacement_h))
+    response_h = joint.structure.response_h(joint.motion(evaluation))
     found = {
         "mean_pressure": evaluation.force_h[:, 0, 0] / joint.contact.area,
         "slip_range": largest_distance(evaluation.state_t) / joint.law.state_stiffness,
@@ -91,7 +91,7 @@ def resonance_frequency(joint: Joint, evaluation: Evaluation) -> tuple[float, fl
     """
     linear = joint.model.harmonic_structure(1)
     force = joint.excitation_amplitude * linear.load_harmonic
-    moved = first_motion(joint, joint.to_relative(evaluation.displacement_h), joint.excitation_amplitude)
+    moved = first_motion(joint, joint.motion(evaluation), joint.excitation_amplitude)
     inertia, work = float(np.real(np.vdot(moved, linear.mass @ moved))), complex(np.vdot(moved, force))
     square = joint.omega**2 + work.real / inertia if inertia > 0.0 else -1.0
     return (float(np.sqrt(square)), 0.5 * abs(work) / (square * inertia)) if square > 0.0 else (float("nan"),) * 2
@@ -187,7 +187,7 @@ class PeriodicMotion:
 def periodic_motion(joint: Joint, at: Evaluation) -> PeriodicMotion:
     """The motion of a state. A joint's displacements behind its pairs follow from the condensation of each harmonic."""
     basis = joint.basis
-    moved = joint.to_relative(at.displacement_h)
+    moved = joint.motion(at)
     whole = Transient(joint).periodic(at).displacement
     displacement_h = from_complex(np.real(whole[0]), whole[1:].T)
     response_h = joint.structure.response_h(moved)

@@ -24,6 +24,7 @@ import numpy as np
 from numba import njit
 from scipy.linalg import eigvals
 
+from solver.compliant_contact import stiffened
 from solver.contact.coulomb import SEPARATED, STICK
 from solver.contact.element import SampledLaw
 from solver.harmonic_balance.dlft import Balance, Evaluation
@@ -132,10 +133,10 @@ def build_monodromy(joint: Joint, at: Evaluation, n_samples: int, n_sectors: int
     """
     steps = -(-n_samples // n_sectors)
     fine = replace(joint, basis=build_basis(joint.basis.orders, steps * n_sectors))
-    state = Balance(fine, at.start_history, at.wear_depth).evaluate(at.predicted_h)
+    state = Balance(fine, at.start_history, at.wear_depth, energy=at.energy).evaluate(at.predicted_h)
     switching, stuck = switching_pairs(state)
     dofs, moves = joint.contact.dofs, moving(joint, stuck)
-    mass, damping, stiffness = _of_sectors(joint.model, moves, n_sectors)
+    mass, damping, stiffness = _of_sectors(stiffened(joint.model, joint.contact), moves, n_sectors)
     inertia, drag = mass / fine.law.sample_step**2, damping / fine.law.sample_step
     compliance = np.asarray(np.linalg.inv(2.25 * inertia + 1.5 * drag + stiffness), np.float64)
     # displacements of the switching pairs among those that move, -1 for none
@@ -227,7 +228,7 @@ def hill_multipliers(joint: Joint, at: Evaluation) -> ComplexArray:
     if (2 * n + n_rel) * m > EXPENSIVE_UNKNOWNS:
         return np.empty(0, np.complex128)
     fine = replace(joint, basis=build_basis(joint.basis.orders, HILL_SAMPLES))
-    balance = Balance(fine, at.start_history, at.wear_depth)
+    balance = Balance(fine, at.start_history, at.wear_depth, energy=at.energy)
     tangent = balance.linearise(balance.evaluate(at.predicted_h))
     size = float(np.abs(linear.stiffness).max())
     # time in 1 / omega, forces over the largest stiffness

@@ -26,6 +26,7 @@ from typing import Literal
 
 import numpy as np
 
+from solver.compliant_contact import stiffened
 from solver.contact.coulomb import SEPARATED
 from solver.harmonic_balance.dlft import Evaluation
 from solver.harmonic_balance.state import Failure, State
@@ -170,7 +171,8 @@ def _sectors(joint: Joint, at: Evaluation) -> int:
 
 def _structures(joint: Joint, at: Evaluation) -> list[LinearModel]:
     """The structures in which disturbances move."""
-    return [joint.model.harmonic_structure(harmonic) for harmonic in range(_sectors(joint, at) // 2 + 1)]
+    model = stiffened(joint.model, joint.contact)
+    return [model.harmonic_structure(harmonic) for harmonic in range(_sectors(joint, at) // 2 + 1)]
 
 
 def _bounces(joint: Joint, at: Evaluation) -> bool:

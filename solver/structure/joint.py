@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -22,10 +23,12 @@ from solver.structure.penalty import Penalty, build_penalty
 class Joint:
     """A joint at one frequency omega, rad/s, and excitation amplitude, N.
 
-    structure: with the spring of the hold, if there is one (`held`).
+    structure: with the spring of the hold, if there is one (`held`). contact: the pairs as they are now, those of the
+    model where nothing has changed them.
     """
 
     model: ReducedModel
+    contact: ContactInterface
     omega: float
     excitation_amplitude: float
     structure: CondensedStructure
@@ -33,10 +36,18 @@ class Joint:
     penalty: Penalty
     hold: Hold | None = None
 
-    @property
-    def contact(self) -> ContactInterface:
-        """The contact pairs."""
-        return self.model.contact
+    def after(self, energy: FloatArray) -> Joint:
+        """The joint after some dissipated energy (n_contact,), J/m2; the same object where it changes nothing."""
+        return self.with_contact(self.model.contact.after(energy))
+
+    def with_contact(self, contact: ContactInterface) -> Joint:
+        """The joint with a contact; the same object where it has this one."""
+        return self if contact is self.contact else replace(self, contact=contact)
+
+    def motion(self, at: Any) -> FloatArray:
+        """Relative displacements (n_rel, m) of the structure, m, in an evaluated state of the joint."""
+        flexibility, _ = self.model.contact.after(at.energy).flexibility
+        return self.to_relative(at.displacement_h + flexibility[:, :, None] * at.force_h)
 
     @property
     def component_index(self) -> IntArray:
@@ -120,7 +131,8 @@ class Case:
         orders = self.resolution.orders
         structure = held(build_structure(self.model, omega, excitation_amplitude, orders), self.hold)
         basis = build_basis(orders, self.resolution.samples)
-        return Joint(self.model, omega, excitation_amplitude, structure, basis, self.penalty, self.hold)
+        contact = self.model.contact
+        return Joint(self.model, contact, omega, excitation_amplitude, structure, basis, self.penalty, self.hold)
 
     def at(self, resolution: Resolution) -> Case:
         """The case with another resolution, and the penalty for its harmonics."""

@@ -34,11 +34,12 @@ class HistoryError:
     """Estimated errors of a history at its counts; inf where not known, NaN beyond the end of the history.
 
     worn_volume, response, wear_rate (n_output,): relative; of the volume 0 where nothing has worn.
-    wear_depth (n_output, n_contact): m. excitation_frequency (n_output,): Hz.
+    wear_depth, dissipated_energy (n_output, n_contact): m, J/m2. excitation_frequency (n_output,): Hz.
     """
 
     worn_volume: FloatArray
     wear_depth: FloatArray
+    dissipated_energy: FloatArray
     response: FloatArray
     wear_rate: FloatArray
     excitation_frequency: FloatArray
@@ -96,7 +97,7 @@ def history_error(outputs: Compared, steps: Compared, area: FloatArray) -> Histo
     """
     values, depth, volume = outputs.values, outputs.values["wear_depth"], outputs.values["wear_depth"] @ area
     differences = zip(_differences(outputs, area), _differences(steps, area), strict=True)
-    error, of_pairs, response, wear_rate = (
+    error, of_pairs, heat, response, wear_rate = (
         DIFFERENCE_SAFETY * np.maximum(here, _largest_before(steps.counts, there, outputs.counts))
         for here, there in differences
     )
@@ -114,17 +115,19 @@ def history_error(outputs: Compared, steps: Compared, area: FloatArray) -> Histo
     n_equal = np.divide(volume**2, squares, out=np.ones_like(squares), where=squares > 0.0)
     of_pair = np.minimum(PAIR_OVER_VOLUME, np.sqrt(n_equal)) * _over(error, volume)
     of_pairs = np.maximum(of_pairs, absolute(of_pair[:, None], depth))
+    heat = np.maximum(heat, absolute(of_pair[:, None], values["dissipated_energy"]))
     response = np.maximum(response, _change_within(volume, error, steps, area))
     frequency = _frequency_error(outputs, DIFFERENCE_SAFETY, np.zeros_like(volume))
-    return _completed(outputs, HistoryError(error, of_pairs, response, wear_rate, frequency), area)
+    return _completed(outputs, HistoryError(error, of_pairs, heat, response, wear_rate, frequency), area)
 
 
 def error_of_given_steps(outputs: Compared, adaptive: HistoryError, area: FloatArray) -> HistoryError:
     """Errors of a history with given steps: its difference to the adaptive history, and the errors of the latter."""
-    volume, of_pairs, response, wear_rate = _differences(outputs, area)
+    volume, of_pairs, heat, response, wear_rate = _differences(outputs, area)
     error = HistoryError(
         _added(volume, absolute(adaptive.worn_volume, outputs.other("wear_depth") @ area)),
         _added(of_pairs, adaptive.wear_depth),
+        _added(heat, adaptive.dissipated_energy),
         # both relative errors of the adaptive history are nearly those of this one: their values are as large
         _added(response, adaptive.response),
         _added(wear_rate, adaptive.wear_rate),
@@ -145,10 +148,14 @@ def _completed(outputs: Compared, error: HistoryError, area: FloatArray) -> Hist
         return np.where(reached, larger, np.nan)
 
     # what has not worn is known to have worn nothing
-    of_pairs = np.where(unknown[:, None], np.where(depth > 0.0, np.inf, 0.0), error.wear_depth)
+    of_pairs, of_heat = (
+        np.where(reached[:, None], np.where(unknown[:, None], np.where(grown > 0.0, np.inf, 0.0), known), np.nan)
+        for grown, known in ((depth, error.wear_depth), (values["dissipated_energy"], error.dissipated_energy))
+    )
     return HistoryError(
         np.where(reached, _over(error.worn_volume, volume), np.nan),
-        np.where(reached[:, None], of_pairs, np.nan),
+        of_pairs,
+        of_heat,
         of_state("response_error", error.response),
         of_state("wear_rate_error", error.wear_rate),
         error.excitation_frequency,
@@ -221,9 +228,9 @@ def _apart(both: Compared, name: str) -> FloatArray:
     return np.where(np.isnan(other) & ~np.isnan(own), np.inf, np.abs(own - other))
 
 
-def _differences(both: Compared, area: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Differences (n, ...) of worn volume, m3, depths, m, response, the larger one of first harmonic and peak, and wear
-    rate, both relative.
+def _differences(both: Compared, area: FloatArray) -> tuple[FloatArray, ...]:
+    """Differences (n, ...) of worn volume, m3, depths, m, energies, J/m2, response, the larger one of first harmonic
+    and peak, and wear rate, both relative.
     """
     apart, more = _apart(both, "wear_depth"), both.values["wear_depth"] >= both.other("wear_depth")
     # of the sums, or of independent pairs where pairs differ in both directions, so that the sums agree by chance
@@ -232,7 +239,8 @@ def _differences(both: Compared, area: FloatArray) -> tuple[FloatArray, FloatArr
         _over(np.linalg.norm(_apart(both, name), axis=1), np.linalg.norm(both.values[name], axis=1))
         for name in ("response", "response_peak")
     )
-    return volume, apart, np.maximum(first, peak), _over(_apart(both, "wear_rate"), both.values["wear_rate"])
+    response, wear_rate = np.maximum(first, peak), _over(_apart(both, "wear_rate"), both.values["wear_rate"])
+    return volume, apart, _apart(both, "dissipated_energy"), response, wear_rate
 
 
 def _added(difference: FloatArray, error: FloatArray) -> FloatArray:

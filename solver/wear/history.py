@@ -10,7 +10,7 @@ import numpy as np
 
 from solver.accuracy.certificate import NOT_CERTIFIED
 from solver.harmonic_balance.state import Failure
-from solver.model import FloatArray, ReducedModel
+from solver.model import ContactInterface, FloatArray, ReducedModel
 from solver.packing import Packed
 from solver.results.history import StartState, WearHistory, first_cut_off, judge, last_error
 from solver.results.state_report import LOOP_PHASES
@@ -118,6 +118,7 @@ def _assembled(model: ReducedModel, start: StartState, request: WearRequest, sol
             "run_time": start.run_time + totals["run_time"],
         },
         cycles=counts,
+        **_of_contact(model.contact, values["dissipated_energy"]),
         worn_volume=values["wear_depth"] @ area,
         reference_volume=both.other("wear_depth") @ area,
         error_estimate=last_error(counts, error.worn_volume, values["wear_rate"], last_cycle),
@@ -129,6 +130,19 @@ def _assembled(model: ReducedModel, start: StartState, request: WearRequest, sol
         cycles_to_target_error=target_error,
         cut_off_cycle=first_cut_off(model.contact, counts, values["mean_pressure"], values["wear_depth"]),
     )
+
+
+def _of_contact(contact: ContactInterface, energy: FloatArray) -> dict[str, Any]:
+    """Friction and contact stiffness of the pairs at dissipated energies (n_output, n_contact), J/m2."""
+    found: dict[str, Any] = {}
+    for name, table, plain in (
+        ("pair_friction", "friction_coefficient", contact.friction),
+        ("pair_stiffness", "contact_stiffness", np.full(contact.n_contact, np.inf)),
+    ):
+        evolved = (contact.after(each).evolution for each in energy)
+        rows = [plain if each is None or (now := each.now(table)) is None else now[0] for each in evolved]
+        found[name] = np.where(np.isnan(energy), np.nan, np.array(rows).reshape(energy.shape))
+    return found
 
 
 def _of_record(record: Record, end: float) -> dict[str, Any]:

@@ -26,7 +26,9 @@ from solver.wear.wearing_joint import LastStep, WearingJoint, WearState
 
 
 def jump(wearing: WearingJoint, state: WearState, worn: FloatArray, cycle: float) -> WearState | Failure:
-    """A stable state of depths (n_contact,), m, beyond the end of a branch: with a hold, or of another branch."""
+    """A stable state beyond the end of a branch: with a hold, or of another branch. worn (2, n_contact): its depths, m,
+    and dissipated energies, J/m2.
+    """
     wearing.run.budget.most_iterations = wearing.run.budget.iterations + SEARCH_ITERATIONS
     reached = _with_hold(wearing, state, worn) or _on_another_branch(wearing, state, worn)
     if isinstance(reached, Failure) and reached.outcome is Outcome.ADRIFT:
@@ -44,7 +46,7 @@ def _with_hold(wearing: WearingJoint, state: WearState, worn: FloatArray, *, dri
     if hold is None:
         return None
     joint = replace(state.point, hold=hold).joint(wearing.case)
-    point = wearing.run.state(Balance(joint, state.point.next_history, worn), state.at.predicted_h)
+    point = wearing.run.state(Balance(joint, state.point.next_history, worn[0], energy=worn[1]), state.at.predicted_h)
     if point is None or not wearing.run.is_stable(joint, point.evaluation):
         return None
     if creeps(joint, hold, point.evaluation) or vibration_change(state.at, point.evaluation) > OTHER_BRANCH:
@@ -55,7 +57,7 @@ def _with_hold(wearing: WearingJoint, state: WearState, worn: FloatArray, *, dri
 
 
 def _on_another_branch(wearing: WearingJoint, state: WearState, worn: FloatArray) -> WearState | Failure:
-    """The state of another branch to which the structure relaxes in time at depths `worn` (n_contact,), m.
+    """The state of another branch to which the structure relaxes in time when it is worn (2, n_contact).
 
     No other search has found a state in 60 random scenes and in the tests where relaxation finds none: neither arc
     length along the frequency through the folds of the branch, nor a first state from rest.
@@ -86,12 +88,12 @@ def free_slide(joint: Joint, at: Evaluation, *, drifts: bool = False) -> Hold | 
     closes = np.abs(along[joint.component_index % 3 == 0]).max(initial=0.0)
     if np.count_nonzero(free) != 1 or closes > NEGLIGIBLE:
         return None
-    motion = joint.to_relative(at.displacement_h)[:, 0]
+    motion = joint.motion(at)[:, 0]
     return Hold(along, HOLD_FRACTION * float(stiffness[-1]), float(along @ motion))
 
 
 def creeps(joint: Joint, hold: Hold, at: Evaluation) -> bool:
     """Whether the force of a hold is so large that the joint would creep noticeably without it."""
     friction = float(joint.contact.friction @ at.force_h[:, 0, 0])
-    moved = float(hold.direction @ joint.to_relative(at.displacement_h)[:, 0]) - hold.position
+    moved = float(hold.direction @ joint.motion(at)[:, 0]) - hold.position
     return abs(hold.stiffness * moved) > HOLD_FRACTION * friction

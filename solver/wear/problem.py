@@ -115,7 +115,8 @@ class WearProblem(WearingJoint):
             after = replace(after, guide=replace(after.guide, resolutions=(*known, (after.cycle, now))))
         # local: sum of the local errors of the steps so far, m3
         values = report | {"local": after.last.error + local}
-        return after, course.after(Node(after.cycle, after.depth, after.rate, values))
+        depth, energy = after.at.slow
+        return after, course.after(Node(after.cycle, depth, after.rate, values, (), energy, after.energy_rate))
 
     def _judged_alone(self, state: WearState, report: dict[str, Any]) -> WearState:
         """The state of a history of zero cycles, whose response is the result: judged by its error with the sweep."""
@@ -157,7 +158,10 @@ class WearProblem(WearingJoint):
             limit = explicit_step_limit(self, state)
             moved, fastest = np.abs(state.at.displacement_h[:, :, 1:]).max(), state.rate.max()
             # the step limit is no bound where almost nothing slips
-            length = min(FIRST_STEP * limit, float(FIRST_DEPTH * moved / fastest), 0.5 * self.limit)
+            lengths = [FIRST_STEP * limit, 0.5 * self.limit]
+            lengths += [FIRST_DEPTH * moved / fastest] if fastest > 0.0 else []
+            lengths += [FIRST_DEPTH / change] if (change := self.change_rate(state)) > 0.0 else []
+            length = float(min(lengths))
         record, guide = replace(state.record, step_limit=limit), replace(state.guide, first_length=length)
         return replace(state, next_length=length, record=record, guide=guide)
 
@@ -216,9 +220,12 @@ class WearProblem(WearingJoint):
         """
         if self.request.steps is not None:
             return 0.0
-        before, after = (float(each.depth @ self.area) for each in (state, end))
+        (before, heat), (after, more_heat) = ((each.at.slow @ self.area).tolist() for each in (state, end))
         rtol = self.case.settings.rtol if self.guide is None else RTOL_RATIO * self.case.settings.rtol
-        ratio = end.last.error / allowed_error(SMALL_SHARE * rtol, before, after, state.cycle, length)
+        made = (before, after, end.last.error), (heat, more_heat, end.last.heat_error)
+        ratio = max(
+            error / allowed_error(SMALL_SHARE * rtol, first, last, state.cycle, length) for first, last, error in made
+        )
         smooth = length <= self._shortest(state) and vibration_change(state.at, end.at) < SMOOTH_CHANGE
         return min(ratio, 1.0) if smooth else ratio
 
@@ -228,8 +235,8 @@ class WearProblem(WearingJoint):
             end = self.attempt(state, length, "implicit") or self._step_across(state, length)
             if end is not None:
                 return end
-        worn = state.depth + length * state.rate
-        if self.guide is None and (failure := too_long(self, state, worn, length)) is not None:
+        worn = state.at.slow + length * np.array([state.rate, state.energy_rate])
+        if self.guide is None and (failure := too_long(self, state, worn[0], length)) is not None:
             return failure
         beyond = jump(self, state, worn, state.cycle + length)
         if isinstance(beyond, Failure):

@@ -42,7 +42,8 @@ class Node:
     """The end of a step.
 
     count: of cycles or missions. depth, rate (k,): worn depths, m, and their rates, m per count, of the pairs; of
-    missions those of all blocks in one row. values: other numbers and arrays, by name. guides: of the blocks.
+    missions those of all blocks in one row. energy, energy_rate (k,): in the same way, the energy that friction has
+    dissipated, J/m2. values: other numbers and arrays, by name. guides: of the blocks.
     """
 
     count: float
@@ -50,6 +51,13 @@ class Node:
     rate: FloatArray
     values: dict[str, Any]
     guides: tuple[Any, ...] = ()
+    energy: FloatArray = field(default_factory=lambda: np.full(1, np.nan))
+    energy_rate: FloatArray = field(default_factory=lambda: np.full(1, np.nan))
+
+    @property
+    def slow(self) -> FloatArray:
+        """Depths, m, and dissipated energies, J/m2 (2, k)."""
+        return np.array([self.depth, np.broadcast_to(self.energy, self.depth.shape)])
 
 
 @packable
@@ -57,8 +65,8 @@ class Node:
 class Course:
     """The steps of a history so far, with a dense output.
 
-    Within a step the depth is a cubic with the rates at both ends, whose slopes are at most three times the mean slope,
-    so that the depth never falls (Fritsch and Carlson 1980). All other values are linear in the worn volume.
+    Within a step depth and energy are cubics with the rates at both ends, whose slopes are at most three times the mean
+    slope, so that they never fall (Fritsch and Carlson 1980). All other values are linear in the worn volume.
 
     area (n_contact,): m2. target: wear whose count is sought; None for none.
     outputs (n_output,): ascending counts to be read, whose steps are stored; empty for counts not known beforehand.
@@ -110,12 +118,16 @@ class Course:
 
     def depth_at(self, counts: FloatArray) -> FloatArray:
         """Depths (n, k), m, at counts (n,); beyond the last step those at its end."""
+        return self._grown(counts, self.depths, self.rates)
+
+    def _grown(self, counts: FloatArray, values: FloatArray, rates: FloatArray) -> FloatArray:
+        """What grows, at counts (n,), from values and rates (n_node, k) at the nodes."""
         start, end, fraction = self._steps_of(counts)
         s, length = fraction[:, None], (self.counts[end] - self.counts[start])[:, None]
-        grown = self.depths[end] - self.depths[start]
-        first, last = (np.minimum(self.rates[place] * length, 3.0 * grown) for place in (start, end))
+        grown = values[end] - values[start]
+        first, last = (np.minimum(rates[place] * length, 3.0 * grown) for place in (start, end))
         bent = (1.0 - s) ** 2 * s * first - s**2 * (1.0 - s) * last
-        return np.asarray(self.depths[start] + s**2 * (3.0 - 2.0 * s) * grown + bent)
+        return np.asarray(values[start] + s**2 * (3.0 - 2.0 * s) * grown + bent)
 
     def _steps_of(self, counts: FloatArray) -> tuple[IntArray, IntArray, FloatArray]:
         """Nodes at start and end of the steps at counts (n,), and the fractions of the steps."""
@@ -132,7 +144,8 @@ class Course:
     def read(self, counts: FloatArray) -> dict[str, Any]:
         """Values at ascending counts (n,), by name; beyond the last step NaN, whole numbers 0.
 
-        `wear_depth`, `depth_rate` (n, k): m, m per count; `wear_rate` (n,): m3 per count; and the values of the nodes.
+        `wear_depth`, `depth_rate`, `dissipated_energy` (n, k): m, m per count, J/m2; `wear_rate` (n,): m3 per count;
+        and the values of the nodes.
         """
         (start, end, fraction), depth = self._steps_of(counts), self.depth_at(counts)
         volumes = self._volumes(self.depths)
@@ -146,7 +159,10 @@ class Course:
             # what is not known at one end of a step is not known within
             return np.where(known, inside, np.where(part == 0.0, first, np.where(part == 1.0, last, first + last)))
 
+        energy = np.array([node.slow[1] for node in self.nodes])
+        energy_rate = np.array([np.broadcast_to(node.energy_rate, node.depth.shape) for node in self.nodes])
         found = {"wear_depth": depth, "depth_rate": between(self.rates)}
+        found["dissipated_energy"] = self._grown(counts, energy, energy_rate)
         found["wear_rate"] = self._volumes(found["depth_rate"])
         for name in self.nodes[-1].values:
             each = np.array([node.values[name] for node in self.nodes])

@@ -49,25 +49,27 @@ worn volume is a sufficient warning (27 % with 0.6)."""
 
 def attempt_step(wearing: WearingJoint, state: WearState, length: float, scheme: Scheme) -> WearState | None:
     """The state after a step of `length` cycles by one balance; None where none is found near its prediction."""
-    depth, rate = state.depth, state.rate
-    worn_before, implicit_cycles = (depth + length * rate, 0.0) if scheme == "explicit" else (depth, length)
-    w, grown = 0.0, np.zeros_like(depth)
+    # rows: depths and dissipated energies
+    now, rate = state.at.slow, np.array([state.rate, state.energy_rate])
+    given, implicit_cycles = (now + length * rate, 0.0) if scheme == "explicit" else (now, length)
+    w, grown = 0.0, np.zeros_like(now)
     if scheme == "adaptive" and (before := state.last.before) is not None:
-        w, grown = length / state.last.length, depth - before.evaluation.wear_depth
-        worn_before = depth + w**2 / (1.0 + 2.0 * w) * grown
+        w, grown = length / state.last.length, now - before.evaluation.slow
+        given = now + w**2 / (1.0 + 2.0 * w) * grown
         implicit_cycles = (1.0 + w) / (1.0 + 2.0 * w) * length
-    gain = wearing.gain(implicit_cycles)
-    start = wearing.joint_of(state), state.point.next_history, worn_before, gain, wearing.wearing_work(state)
-    balance, predicted = first_guess(wearing, state, Balance(*start, state.at.predicted_t), length)
+    start = wearing.joint_of(state), state.point.next_history, given[0], wearing.gain(implicit_cycles)
+    more = wearing.wearing_work(state), state.at.predicted_t, given[1], wearing.energy_gain(implicit_cycles)
+    balance, predicted = first_guess(wearing, state, Balance(*start, *more), length)
     end = wearing.solve(balance, predicted, state)
     if end is None or _surprise(state, end, predicted) > SMOOTH_CHANGE or _runs_away(state, end):
         return None
-    error = 0.5 * length * (end.rate - rate)
+    error = 0.5 * length * (np.array([end.rate, end.energy_rate]) - rate)
     if w > 0.0:
-        explicit_depth = depth + (1.0 + w) * length * rate - w**2 * grown
+        explicit = now + (1.0 + w) * length * rate - w**2 * grown
         own, other = (1.0 + w) ** 2 / (6.0 * w * (1.0 + 2.0 * w)), (1.0 + 1.0 / w) / 6.0
-        error = own / (own + other) * (end.depth - explicit_depth)
-    last = LastStep(state.point, length, float(np.abs(error) @ wearing.area))
+        error = own / (own + other) * (end.at.slow - explicit)
+    worn, heat = (float(each @ wearing.area) for each in np.abs(error))
+    last = LastStep(state.point, length, worn, heat if wearing.case.model.contact.evolution else 0.0)
     return replace(end, cycle=state.cycle + length, last=last)
 
 
@@ -129,7 +131,7 @@ def _rate_changes(wearing: WearingJoint, state: WearState, depths: FloatArray, *
     Newton direction. fixed_factors: whether the factors of a table keep their values.
     """
     joint, at, gain = wearing.joint_of(state), state.at, wearing.gain(1.0)
-    force_tangent, work_tangent = joint.law.tangent(at)
+    force_tangent, work_tangent, _ = joint.law.tangent(at)
     by_work, by_force, by_depth = (gain * part for part in wearing.wearing_work(state).slopes(*worn_by(at)))
     growth = by_work[:, None] * work_tangent + by_force[:, None] * force_tangent[:, 0]
     changes = depths * (0.0 if fixed_factors else by_depth)
@@ -139,7 +141,7 @@ def _rate_changes(wearing: WearingJoint, state: WearState, depths: FloatArray, *
     if acting.any():
         rights = np.zeros((int(acting.sum()), *at.predicted_h.shape))
         rights[:, :, 0] = -closing[acting] @ joint.structure.static_stiffness
-        steps = wearing.run.steps(Balance(joint, at.start_history, state.depth), at, rights)
+        steps = wearing.run.steps(Balance(joint, at.start_history, state.depth, energy=at.energy), at, rights)
         moved = np.array([joint.to_pairs(step).reshape(growth.shape) for step in steps])
         changes[acting] += (growth * moved).sum(axis=2)
     return changes

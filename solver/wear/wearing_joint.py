@@ -11,12 +11,13 @@ amplitude (`solver.continuation.phase_lag`).
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
 
 from solver.accuracy.resolved_state import NOTHING, UNKNOWN, Estimate, left_out
+from solver.contact.coulomb import friction_limit
 from solver.contact.wear_law import ARCHARD, WearingWork, WearLaw, wearing_work
 from solver.continuation.natural import NEAR_ITERATIONS
 from solver.continuation.phase_lag import PEAK_RISE, rise_of_response, solve_at_lag, solve_at_peak
@@ -105,11 +106,14 @@ class Checked:
 @packable
 @dataclass(frozen=True)
 class LastStep:
-    """The state before a step, None at the first state and after a jump; length, cycles, and local error, m3."""
+    """The state before a step, None at the first state and after a jump; length, cycles; local errors: of the volume,
+    m3, and of the energy that an evolving contact has dissipated, J.
+    """
 
     before: State | None = None
     length: float = math.nan
     error: float = 0.0
+    heat_error: float = 0.0
 
 
 @packable
@@ -138,8 +142,9 @@ class Record:
 class WearState:
     """A wearing joint at one cycle count; the next step depends on this state only.
 
-    cycle: count. point: periodic state with its depth and tangential history. rate (n_contact,): of its wear, m per
-    cycle. guide: for the reference solution. next_length: largest length of the next step, cycles.
+    cycle: count. point: periodic state with its depth and tangential history. rate, energy_rate (n_contact,): of its
+    wear, m per cycle, and of the energy that friction dissipates, J/m2 per cycle. guide: for the reference solution.
+    next_length: largest length of the next step, cycles.
     lag, half_width: of a followed frequency: phase lag, rad, and change of the frequency over that of the lag, rad/s.
     """
 
@@ -153,6 +158,7 @@ class WearState:
     next_length: float = 1.0
     lag: float = 0.5 * math.pi
     half_width: float = 0.0
+    energy_rate: FloatArray = field(default_factory=lambda: np.full(1, np.nan))
 
     @property
     def at(self) -> Evaluation:
@@ -163,6 +169,14 @@ class WearState:
     def depth(self) -> FloatArray:
         """Worn depth (n_contact,), m."""
         return self.at.wear_depth
+
+
+def slip_at_most(at: Evaluation) -> float:
+    """Slip work, J, if every pair slipped as far as it moves. The static slip included: where all pairs stick, the
+    vibration alone is round-off.
+    """
+    pressed = np.abs(at.force_t[:, 0]).max(axis=1)
+    return float(pressed @ np.linalg.norm(at.displacement_h[:, 1:], axis=(1, 2)))
 
 
 class WearingJoint:
@@ -188,8 +202,8 @@ class WearingJoint:
         return state.point.joint(self.case)
 
     def wearing_work(self, state: WearState) -> WearingWork:
-        """Of the pairs by the wear law, at the frequency of a state."""
-        return self._work.at(state.point.omega / (2.0 * math.pi))
+        """Of the pairs by the wear law, at the frequency and with the friction of a state."""
+        return self._work.at(state.point.omega / (2.0 * math.pi)).rubbing(self.joint_of(state).contact.friction)
 
     def gain(self, cycles: float) -> FloatArray:
         """Growth of the depth over wearing work (n_contact,), m/J, in h cycles: `h k_w / alpha`, Eqs. (7), (24)."""
@@ -221,23 +235,35 @@ class WearingJoint:
 
     def with_rates(self, state: WearState) -> WearState:
         """The state with its wear rates, Eqs. (7), (21), (25)."""
-        wearing = self.wearing_work(state)
-        rate = self.gain(1.0) * wearing.work(*worn_by(state.at))
-        # the static slip included: where all pairs stick, the vibration alone is round-off
-        pressed = np.abs(state.at.force_t[:, 0]).max(axis=1)
-        moved = float(pressed @ np.linalg.norm(state.at.displacement_h[:, 1:], axis=(1, 2)))
-        most = max(state.record.most_rate, self.request.wear_coefficient * (wearing.largest_factor * moved))
+        wearing, contact = self.wearing_work(state), self.joint_of(state).contact
+        rate = self.gain(1.0) * contact.wear_factor[0] * wearing.work(*worn_by(state.at))
+        energy_rate = friction_limit(contact.friction, state.at.slip_work) / self.area
+        slip = slip_at_most(state.at)
+        most = max(state.record.most_rate, self.request.wear_coefficient * (wearing.largest_factor * slip))
         rates = rate * self.area
         largest = np.maximum(state.record.largest_rates, np.abs(np.append(rates, rates.sum())))
-        return replace(state, rate=rate, record=replace(state.record, largest_rates=largest, most_rate=most))
+        record = replace(state.record, largest_rates=largest, most_rate=most)
+        return replace(state, rate=rate, energy_rate=energy_rate, record=record)
 
     def volume_rate(self, state: WearState) -> float:
         """Wear rate of all pairs together, m3 per cycle."""
         return float((state.rate * self.area).sum())
 
     def wears(self, state: WearState) -> bool:
-        """Whether the wear rate of a state is above the round-off of the slip by the static load."""
-        return self.volume_rate(state) > ROUND_OFF * state.record.most_rate
+        """Whether the wear rate of a state is above the round-off of the slip by the static load, or its contact
+        changes.
+        """
+        return self.volume_rate(state) > ROUND_OFF * state.record.most_rate or self.change_rate(state) > 0.0
+
+    def change_rate(self, state: WearState) -> float:
+        """Largest relative change of an evolving contact in a cycle; 0 for slip that is round-off."""
+        rate = self.joint_of(state).contact.relative_change(state.energy_rate)
+        slips = state.at.slip_work.sum() > ROUND_OFF * slip_at_most(state.at)
+        return rate if slips else 0.0
+
+    def energy_gain(self, cycles: float) -> FloatArray:
+        """Growth of the dissipated energy over the work of friction (n_contact,), 1/m2, in h cycles."""
+        return cycles / self.area
 
     def solve(
         self, balance: Balance, start: FloatArray, state: WearState, most: int = NEAR_ITERATIONS
@@ -265,7 +291,7 @@ class WearingJoint:
         """The state at the frequency that is followed, with its depth and its tangential history."""
         if self.request.follow is None:
             return state
-        balance = Balance(self.joint_of(state), state.at.start_history, state.depth)
+        balance = Balance(self.joint_of(state), state.at.start_history, state.depth, energy=state.at.energy)
         return self.solve(balance, state.at.predicted_h, state, MOST_ITERATIONS) or self.lost(state)
 
     def lost(self, state: WearState) -> Failure:

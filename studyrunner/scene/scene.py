@@ -137,7 +137,11 @@ def _wrong_beside(study: Study, model: ReducedModel) -> Iterator[Wrong]:
     """What of a study does not fit to the pairs of its scene."""
     contact, friction, loops = model.contact, study.friction_coefficient, study.outputs.loops
     given = contact.friction_coefficient is not None
-    if study.scene.path is not None and given == (friction is not None):
+    own = "friction_coefficient" in study.evolving
+    if study.scene.path is not None and own and given:
+        remedy = "leave it out: contact/friction_coefficient in the scene file gives each pair its own"
+        yield Wrong("wear.evolution.friction_coefficient", None, remedy)
+    elif study.scene.path is not None and given == (friction is not None) and not own:
         file = "contact/friction_coefficient in the scene file"
         remedy = f"leave it out: {file} gives each pair its own" if given else f"missing: give it, or {file}"
         yield Wrong("scene.friction_coefficient", friction, remedy)
@@ -146,6 +150,11 @@ def _wrong_beside(study: Study, model: ReducedModel) -> Iterator[Wrong]:
             surface_factors(contact.surface, study.wear.as_law.surfaces)
         except ValueError as error:
             yield Wrong("wear.surfaces", study.wear.surfaces, str(error))
+    for name, tables in study.evolving.items():
+        labels = [*dict.fromkeys(contact.surface)]
+        if "" not in tables and {*tables} != {*labels}:
+            remedy = f"give a list to each of the surfaces {', '.join(labels)}, and to no other"
+            yield Wrong(f"wear.evolution.{name}", [*tables], remedy)
     if loops and max(loops) >= contact.n_contact:
         remedy = f"give indices from 0 to {contact.n_contact - 1}, the contact pairs of the scene"
         yield Wrong("outputs.loops", max(loops), remedy)

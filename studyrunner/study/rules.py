@@ -20,7 +20,7 @@ def broken_rules(study: Study, first: bool) -> Iterator[Wrong]:
     it is the first of the variants, which have the same axes.
     """
     of_all = (_keys, study.kind.part("rules").broken_rules, _frequency, _amplitude) if first else ()
-    for rule in (*of_all, _outputs, _solver_and_end, _scatter):
+    for rule in (*of_all, _outputs, _solver_and_end, _scatter, _evolution):
         yield from rule(study)
 
 
@@ -110,6 +110,20 @@ def _solver_and_end(study: Study) -> Iterator[Wrong]:
     if "final" in schemes and (not study.to_the_end or slow_time.until is not None):
         remedy = "give slow_time.cycles = inf, without until, beside it: it finds where nothing wears any more"
         yield Wrong("axes.scheme", "final", remedy)
+
+
+def _evolution(study: Study) -> Iterator[Wrong]:
+    """What changes with the dissipated energy is given once."""
+    for name in study.evolving.keys() & {"friction_coefficient", "contact_stiffness"}:
+        remedy = f"leave it out: the first numbers of wear.evolution.{name} are those of the unworn joint"
+        given = dict(study.scene.parameters).get(name)
+        if name in study.scene.parameters.model_fields_set and given is not None:
+            yield Wrong(f"scene.{name}", given, remedy)
+        for block in study.mission:
+            if name in block.parameters:
+                yield Wrong(f"mission.{block.name}.{name}", block.parameters[name], remedy)
+        if study.scatter is not None and name in study.scatter.inputs:
+            yield Wrong(f"scatter.{name}", None, remedy)
 
 
 def _scatter(study: Study) -> Iterator[Wrong]:

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, cast
 
 from pydantic import AfterValidator, Field
 
+from solver.compliant_contact import LARGEST_FRICTION
 from solver.contact.wear_law import PowerTerms, WearLaw, WearTable
 from solver.settings import TARGETS, Followed
 from studies.scene import Unit
@@ -92,6 +93,50 @@ class AxesSection(Section):
     mode: Axis[_Number] = Field((1,), description="number of the nonlinear mode, by frequency, from 1 on")
 
 
+_Table = Annotated[Listed[Positive], Field(min_length=2, max_length=_MOST_KNOTS)]
+_Tables = _Table | Annotated[dict[str, _Table], Field(min_length=1)]
+
+
+class EvolutionSection(Section):
+    """[wear.evolution]: what changes with the energy that friction dissipates at a pair, over its area."""
+
+    energy: Annotated[Listed[NotNegative], Field(min_length=2, max_length=_MOST_KNOTS), AfterValidator(ascending)] = (
+        Field(description="J/m2, ascending from 0; between them all is linear, beyond the last one constant")
+    )
+    friction_coefficient: _Tables | None = Field(
+        None,
+        description="one at each energy, or a table of lists, one for each surface of the scene; in place of"
+        " scene.friction_coefficient",
+    )
+    contact_stiffness: _Tables | None = Field(
+        None, description="N/m3, in the same way; in place of scene.contact_stiffness"
+    )
+    wear_factor: _Tables | None = Field(None, description="factors of wear_coefficient, in the same way")
+
+    @property
+    def tables(self) -> dict[str, dict[str, tuple[float, ...]]]:
+        """What changes, by name: numbers at each energy by the surface, "" for all surfaces."""
+        given = {name: getattr(self, name) for name in ("friction_coefficient", "contact_stiffness", "wear_factor")}
+        whole = {name: each if isinstance(each, dict) else {"": each} for name, each in given.items() if each}
+        return {name: {label: tuple(values) for label, values in each.items()} for name, each in whole.items()}
+
+    def rules(self) -> Iterator[Wrong]:
+        """At least one table, with a number in its range for each energy."""
+        if self.energy[0] != 0.0:
+            yield Wrong("energy", self.energy[0], "begin with 0, the unworn joint")
+        if not self.tables:
+            yield Wrong("", None, "give friction_coefficient, contact_stiffness or wear_factor, one at each energy")
+        for name, by_surface in self.tables.items():
+            for label, values in by_surface.items():
+                key = ".".join(filter(None, (name, label)))
+                if len(values) != len(self.energy):
+                    yield Wrong(key, list(values), f"give {len(self.energy)} numbers, one for each energy")
+                if name == "friction_coefficient" and max(values) > LARGEST_FRICTION:
+                    yield Wrong(key, max(values), f"give at most {LARGEST_FRICTION:g}: dry metals have less than 1.5")
+                if name == "contact_stiffness" and min(values) < values[0]:
+                    yield Wrong(key, min(values), "give none below the first one, that of the unworn joint")
+
+
 class WearSection(Section):
     """[wear]: which law, what it takes, and how surfaces differ."""
 
@@ -122,6 +167,10 @@ class WearSection(Section):
     )
     surfaces: dict[str, NotNegative] | None = Field(
         None, description="factor of wear_coefficient on each surface of the scene, as {flat = 1.0, cylinder = 0.5}"
+    )
+
+    evolution: EvolutionSection | None = Field(
+        None, description="friction, contact stiffness and wear coefficient that change while the joint rubs"
     )
 
     def rules(self) -> Iterator[Wrong]:

@@ -86,9 +86,16 @@ class Study(Section):
 
     @property
     def friction_coefficient(self) -> float | None:
-        """Coulomb friction coefficient of all pairs; None where each pair has its own."""
+        """Coulomb friction coefficient of all pairs, unworn; None where each pair has its own."""
+        if tables := self.evolving.get("friction_coefficient"):
+            return tables[""][0] if "" in tables else None
         value = dict(self.scene.parameters)["friction_coefficient"]
         return None if value is None or isinstance(value, dict) else float(value)
+
+    @property
+    def evolving(self) -> Mapping[str, Mapping[str, tuple[float, ...]]]:
+        """What changes with the dissipated energy, as `EvolutionSection.tables`; nothing where none is given."""
+        return {} if self.wear.evolution is None else self.wear.evolution.tables
 
     @property
     def until(self) -> WearTarget | None:

@@ -14,7 +14,7 @@ from solver.settings import FOLLOWED, Followed, FollowedFrequency
 from studies.hdf5 import is_hdf5
 from studyrunner.coordinates import COORDINATES, SCENE
 from studyrunner.kinds.table import KINDS
-from studyrunner.kinds.wear.kind import FOLLOWED_FREQUENCY
+from studyrunner.kinds.wear.kind import FOLLOWED_FREQUENCY, OF_EVOLUTION
 from studyrunner.scatter import flat_table
 from studyrunner.study import scene_axes, sections
 from studyrunner.study.design import Design, read_archived_design, read_design
@@ -195,6 +195,7 @@ def _complete(study: Study) -> Study:
         names |= {*(kind.usual if study.scatter is None else kind.of_samples)}
         names |= {*(FOLLOWED_FREQUENCY if study.loading is not None else ())}
         names |= {"friction_power"} & {*kind.asked} if study.wear.law == "power" else set()
+        names |= {*OF_EVOLUTION} & {*kind.asked} if study.evolving else set()
         names |= {"mesh"} & {*study.scene.offers}
     if study.scatter is not None and study.scatter.given_limits:
         names |= {"worn_volume", "worn_volume_error", "wear_depth_max", "wear_depth_max_error"}

@@ -108,12 +108,18 @@ def cyclic_model(
 
 
 def random_balance(
-    model: ReducedModel, settings: SolverSettings, seed: int, *, wear: bool, resolution: Resolution | None = None
+    model: ReducedModel,
+    settings: SolverSettings,
+    seed: int,
+    *,
+    wear: bool,
+    resolution: Resolution | None = None,
+    friction: float | None = 0.4,
 ) -> tuple[Balance, FloatArray]:
     """Balance with a history that is not zero, and a predicted force at which pairs stick, slip and open."""
     random = np.random.default_rng(seed)
     resolution = resolution or first_resolution(settings)
-    joint = case_of(model, 0.4, OMEGA, settings, resolution).joint(OMEGA, 60.0)
+    joint = case_of(model, friction, OMEGA, settings, resolution).joint(OMEGA, 60.0)
     n_contact = model.contact.n_contact
     history = 0.12 * PRELOAD / joint.penalty.tangential[:, None] * random.normal(size=(n_contact, 2))
     history[model.contact.dofs[:, 1:] < 0] = 0.0

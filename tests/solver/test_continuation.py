@@ -62,7 +62,7 @@ NATURAL = np.sqrt(1.6e6)
 @pytest.mark.parametrize("omega", [0.3, 1.3])
 def test_two_masses_relax_from_rest_to_their_exact_motion(omega):
     orbit = coulomb_orbit([[1, 0], [0, 1]], [[0.04, -0.02], [-0.02, 0.02]], [[2, -1], [-1, 1]], [20, 0], 1, 7.2, omega)
-    case, idle = case_of(scene("two_masses"), 0.5, omega, SolverSettings(21, 256)), np.zeros(1)
+    case, idle = case_of(scene("two_masses"), 0.5, omega, SolverSettings(21, 256)), np.zeros((2, 1))
     rest = first_point(case, omega, 0.0)
     quiet, joint = case.joint(omega, 0.0), case.joint(omega, 20.0)
     found = relax_to_periodic(joint, idle, rest, quiet, Run(1e-8))
@@ -83,7 +83,7 @@ def test_a_motion_leaves_an_unstable_state_whose_growth_long_steps_would_damp(ch
     passed = ((a, b) for a, b, _ in arc.steps(1.0) if (a.parameter - 0.03) * (b.parameter - 0.03) < 0.0)
     middle = next(filter(grows, (arc.state_at(a, b, 0.03) for a, b in passed)))
     before, joint = (path.joint_at(0.03 * (1.0 + part)) for part in (0.0, change))
-    found = relax_to_periodic(joint, np.zeros(1), middle, before, Run(1e-8))
+    found = relax_to_periodic(joint, np.zeros((2, 1)), middle, before, Run(1e-8))
     assert isinstance(found, State)
     assert not grows(replace(found, parameter=joint.excitation_amplitude))
     # the two sides of the unstable state end at different stable states
@@ -123,7 +123,7 @@ def test_a_motion_that_has_not_settled_within_its_effort_is_unsettled(monkeypatc
     model, settings = scene("sdof_slider", normal_stiffness=0.0), SolverSettings(5, 64)
     case = case_of(model, 0.3, 0.8 * NATURAL, settings)
     quiet, joint = case.joint(0.8 * NATURAL, 0.0), case.joint(0.8 * NATURAL, 10.0)
-    idle = np.zeros(1)
+    idle = np.zeros((2, 1))
     rest = first_point(case, 0.8 * NATURAL, 0.0)
     outcomes = []
     for most in (transient.SEARCH_ITERATIONS, 10):

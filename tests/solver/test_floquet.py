@@ -158,7 +158,9 @@ def test_a_state_is_unstable_only_where_it_is_so_with_many_samples(monkeypatch):
     case = case_of(model, 0.0, 1.2, settings)
     first_point(case, 1.2, 0.02)
     rest, joint = state_at_rest(case, 1.2, Run(settings.tolerance)), case.joint(1.2, 0.02)
-    assert isinstance(relax_to_periodic(joint, np.zeros(1), rest, case.joint(1.2, 0.0), Run(settings.tolerance)), State)
+    assert isinstance(
+        relax_to_periodic(joint, np.zeros((2, 1)), rest, case.joint(1.2, 0.0), Run(settings.tolerance)), State
+    )
 
 
 def test_multipliers_of_many_harmonics_have_samples_enough(monkeypatch):

@@ -109,7 +109,7 @@ def test_the_error_holds_the_steps_within_a_block(blocks, missions, settings, ex
 
 def test_a_block_that_continues_begins_with_the_errors_of_the_last_state():
     (first, _) = blocks = as_computed(*two_blocks())
-    result = run_block(BlockInput(MissionRequest(blocks, WEAR, (0, 2), SolverSettings()), first, np.zeros(1)))
+    result = run_block(BlockInput(MissionRequest(blocks, WEAR, (0, 2), SolverSettings()), first, np.zeros((2, 1))))
     last = result.last
     assert last.by_resolution == Estimate(last.response_error, last.wear_rate_error, last.by_resolution.weight)
 
@@ -118,8 +118,8 @@ def begun_again(block, depth):
     """A block at an even depth by its own way, and as at the depth 0 before."""
     mission, pairs = MissionRequest(as_computed(block), WEAR, (0, 2), SETTINGS), np.ones(block.model.contact.n_contact)
     (block,) = mission.blocks
-    first, own = (run_block(BlockInput(mission, block, at * pairs)) for at in (0.0, depth))
-    return own, run_block(BlockInput(mission, block, depth * pairs, earlier=first.sweep))
+    first, own = (run_block(BlockInput(mission, block, np.array([at * pairs, 0.0 * pairs]))) for at in (0.0, depth))
+    return own, run_block(BlockInput(mission, block, np.array([depth * pairs, 0.0 * pairs]), earlier=first.sweep))
 
 
 @pytest.mark.slow
@@ -143,9 +143,9 @@ def test_a_way_is_gone_again_only_where_the_state_depends_on_it():
 def test_an_earlier_sweep_serves_as_long_as_its_choices_do(where, cycles, kept):
     """Also with other harmonics of its nodes; a vibration that differs by 0.35 needs errors of its own."""
     (block,) = blocks = as_computed(Block(dovetail(5), *where, cycles))
-    unworn = BlockInput(MissionRequest(blocks, WEAR, (0, 2), SETTINGS), block, np.zeros(16))
+    unworn = BlockInput(MissionRequest(blocks, WEAR, (0, 2), SETTINGS), block, np.zeros((2, 16)))
     start, sweep = find_start(unworn)
-    worn = replace(unworn, depth=cycles * unworn.wearing_joint(start)[1].rate)
+    worn = replace(unworn, worn=cycles * np.array([unworn.wearing_joint(start)[1].rate, np.zeros(16)]))
     earlier = replace(sweep, resolution=Resolution((1, 2, 3, 4, 5), 64))
     again, after = find_start(replace(worn, earlier=earlier))
     assert again.outcome is Outcome.CONVERGED
@@ -190,7 +190,7 @@ def exact_run(case):
     growth = change[:2] @ np.append(case.depth, 1.0)
     response = np.array([[complex(depth.sum())] for depth in (case.depth, case.depth + growth)])
     slope = change[:2, :2] if case.with_slope else None
-    return BlockResult(growth, response, np.abs(response), slope, guide=Guide((), 1.0))
+    return BlockResult(growth, np.zeros(2), response, np.abs(response), slope, guide=Guide((), 1.0))
 
 
 @pytest.fixture
@@ -247,15 +247,15 @@ def test_a_step_is_of_second_order_and_its_error_is_known(monkeypatch):
     monkeypatch.setattr("solver.missions.step.allowed_error", lambda *_: 1e-16)
     nodes = list(unworn_course(mission).nodes)
 
-    def run(depth, with_slope):
+    def run(worn, with_slope):
         runs = []
         for block in mission.blocks:
-            runs.append(exact_run(BlockInput(mission, block, depth, with_slope=with_slope)))
-            depth = depth + runs[-1].growth
+            runs.append(exact_run(BlockInput(mission, block, worn, with_slope=with_slope)))
+            worn = worn + np.array([runs[-1].growth, np.zeros(2)])
         return tuple(runs)
 
     def step(before, length):
-        taken = attempt_step(tuple(before), length, mission.area, run, 1.0)
+        taken = attempt_step(tuple(before), length, mission.blocks[0].model.contact, run, 1.0)
         assert isinstance(taken, MissionStep)
         return taken
 

@@ -21,7 +21,9 @@ WEAR, SETTINGS = 1.1e-11, SolverSettings(harmonics=3, samples=64)
 def state(frequency, density, branch=0, response=0.0):
     nan = float("nan")
     start = StartState(Outcome.CONVERGED, None, nan, Resolution((1,), 4), 0.0, 0.0, 0, 0.0, branch, 1.5)
-    return passages.SweptState(frequency, start, np.array([density]), np.array([response + 0j]), np.array([response]))
+    return passages.SweptState(
+        frequency, start, np.array([density]), np.zeros(1), np.array([response + 0j]), np.array([response])
+    )
 
 
 def test_the_error_of_the_trapezoidal_rule_is_known_on_both_sides_of_a_jump():
@@ -66,7 +68,7 @@ def test_a_vibration_is_late_by_its_decay_time():
         # too little wear to change the pressures on the way
         model = with_friction(scene("sdof_slider", damping=damping), 0.5)
         block = Block(model, Passage(180.0, 220.0, rate), 10.0, None)
-        return BlockInput(MissionRequest((block,), 1e-6 * WEAR, (0, 1), SETTINGS), block, np.zeros(1))
+        return BlockInput(MissionRequest((block,), 1e-6 * WEAR, (0, 1), SETTINGS), block, np.zeros((2, 1)))
 
     fast, slow = passages.run_passage(case(7.0)), passages.run_passage(case(0.07))
     assert fast.sweep_rate == pytest.approx(7.0 / (30.0 / (2.0 * np.pi)) ** 2)
@@ -90,7 +92,7 @@ def swept_with(monkeypatch, density, depth, near=None):
     passage = Passage(1.0, 2.0, 1e-4)
     block = Block(scene("sdof_slider"), passage, 10.0, None, begin="up")
     mission = MissionRequest((block,), WEAR, (0, 1), SETTINGS)
-    swept = passages.find_states(BlockInput(mission, block, np.array([depth]), earlier=near))
+    swept = passages.find_states(BlockInput(mission, block, np.array([[depth], [0.0]]), earlier=near))
     assert isinstance(swept, passages.Swept)
     return swept
 
@@ -100,7 +102,9 @@ def test_a_passage_says_that_the_modelled_contact_is_cut_off():
     for edge in (False, True):
         cut = replace(model, contact=replace(model.contact, edge=np.array([edge])))
         block = Block(cut, Passage(150.0, 165.0, 7.0), 10.0, None)
-        found = passages.run_passage(BlockInput(MissionRequest((block,), WEAR, (0, 1), SETTINGS), block, np.zeros(1)))
+        found = passages.run_passage(
+            BlockInput(MissionRequest((block,), WEAR, (0, 1), SETTINGS), block, np.zeros((2, 1)))
+        )
         assert found.cut_off is edge
 
 

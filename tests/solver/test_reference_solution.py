@@ -157,6 +157,7 @@ def read(depth, rate=((1.0, 1.0), (1.0, 1.0), (1.0, 1.0)), **other):
     rates = np.array(rate, float)
     values: dict[str, Any] = {
         "wear_depth": depth,
+        "dissipated_energy": depth,
         "depth_rate": rates,
         "wear_rate": rates @ AREA,
         "local": np.zeros(3),
@@ -175,7 +176,13 @@ LESS_KNOWN = 3.0 / 5.0**0.5  # root of the number of equal pairs that share a vo
 
 def at_step(value, n_pairs=2):
     """Values at one step, all alike."""
-    shapes = {"wear_depth": (1, n_pairs), "response": (1, 1), "response_peak": (1, 1), "wear_rate": (1,)}
+    shapes = {
+        "wear_depth": (1, n_pairs),
+        "dissipated_energy": (1, n_pairs),
+        "response": (1, 1),
+        "response_peak": (1, 1),
+        "wear_rate": (1,),
+    }
     return {name: np.full(shape, value) for name, shape in shapes.items()}
 
 
@@ -271,7 +278,7 @@ def test_one_pair_is_known_as_the_volume_and_one_of_many_half_as_well(worn, less
 
 def test_given_steps_are_wrong_by_what_they_differ_and_by_what_the_adaptive_history_is_wrong():
     other = [[0.0, 0.0], [1.2, 0.9], [2.4, np.nan]]
-    known = HistoryError(np.array([0.0, 0.1, 0.1]), 0.1 * np.array(other), *np.full((2, 3), 1e-2), np.zeros(3))
+    known = HistoryError(np.array([0.0, 0.1, 0.1]), *[0.1 * np.array(other)] * 2, *np.full((2, 3), 1e-2), np.zeros(3))
     found = error_of_given_steps(Compared(COUNTS, read(DEPTH), read(other)), known, AREA)
     assert found.worn_volume == pytest.approx([0.0, (0.4 + 0.1 * 3.0) / 3.0, np.inf])
     assert found.wear_depth[1] == pytest.approx([0.2 + 0.12, 0.1 + 0.09])

@@ -83,9 +83,9 @@ def test_the_derivative_is_that_of_differences():
     agreed = others = 0
     for first, last, state in (path for seed in range(60) if (path := random_path(seed)) is not None):
         path = Path(*((part @ BASIS.synthesis)[None] for part in (first, last)), np.array([FRICTION]), state[None])
-        exact = np.zeros((1, 2, 3 * first.shape[1]))
+        exact = np.zeros((1, 2, 3 * first.shape[1] + 1))
         slide_tangent(np.array([0]), path, BASIS.synthesis, exact)
-        for index in np.random.default_rng(0).integers(exact.shape[2], size=8):
+        for index in np.random.default_rng(0).integers(last.size, size=8):
             change = np.zeros_like(last)
             change.flat[index] = 1e-6
             sides = [slid(path.first[0], (last + sign * change) @ BASIS.synthesis, state) for sign in (1.0, -1.0)]

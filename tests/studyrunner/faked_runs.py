@@ -57,7 +57,16 @@ class Solver:
 
 LIKE_VOLUME = ("worn_volume", "wear_rate", "penetration", "tension", "cone_violation", "energy_error", "friction_use")
 LIKE_DEPTH = (
-    *("wear_depth", "mean_pressure", "slip_range", "open_fraction", "friction_power"),
+    *(
+        "wear_depth",
+        "dissipated_energy",
+        "pair_friction",
+        "pair_stiffness",
+        "mean_pressure",
+        "slip_range",
+        "open_fraction",
+        "friction_power",
+    ),
     *("response_mean", "response_peak"),
 )
 
@@ -80,6 +89,7 @@ def history(cycles: list[float], outcome: Outcome = Outcome.CONVERGED, loops: np
         "samples_used": np.full(n, 64),
         "worn_volume_error": 0.03 * line,
         "wear_depth_error": 0.1 * pair,
+        "dissipated_energy_error": 0.1 * pair,
         "reference_volume": 1.5 * line,
     }
     totals = {"jump_cycle": np.nan, "error_estimate": 0.0, "newton_iterations": 7, "run_time": 0.5, "branch": 2}

@@ -61,6 +61,8 @@ OF_MISSIONS = {
     ),
     "worn_volume_error": _by_mission("worn_volume_error"),
     "wear_depth_error": _by_mission("wear_depth_error"),
+    "dissipated_energy": _by_mission("dissipated_energy"),
+    "dissipated_energy_error": _by_mission("dissipated_energy_error"),
 }
 
 OF_A_MISSION = {

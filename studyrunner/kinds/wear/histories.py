@@ -330,9 +330,13 @@ def _at_counts(
 
     slower: wear coefficient over that of the history.
     """
+    with np.errstate(divide="ignore", invalid="ignore"):
+        # of an unworn joint, whose state at cycle 0 is that of all counts, no energy is known
+        energies = {name: getattr(history, name) / slower for name in ("dissipated_energy", "dissipated_energy_error")}
     own = {
         **first_harmonic(history.response),
         **deepest(history.wear_depth, history.wear_depth_error),
+        **energies,
         "wear_rate": slower * history.wear_rate,
         "cycle_count": history.cycles / slower,
     }

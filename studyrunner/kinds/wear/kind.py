@@ -30,6 +30,14 @@ ASKED = {
         _CYCLE, "Hz", "estimated error of excitation_frequency", "0 for a given frequency."
     ),
     "slip_range": Variable(_PAIRS, "m", "range of the slip over a period", "Largest distance of two places."),
+    "dissipated_energy": Variable(
+        _PAIRS, "J/m2", "energy that friction has dissipated", "Since cycle 0, on contact_area; see [wear.evolution]."
+    ),
+    "dissipated_energy_error": Variable(_PAIRS, "J/m2", "estimated error of the dissipated energy"),
+    "pair_friction": Variable(_PAIRS, "1", "friction coefficient of the pair", "Changes with [wear.evolution]."),
+    "pair_stiffness": Variable(
+        _PAIRS, "N/m3", "contact stiffness of the pair", "Of [wear.evolution]; inf without one: that of the scene."
+    ),
     "friction_power": Variable(_PAIRS, "W/m2", "power density of friction", "Mean over a period, on contact_area."),
     "open_fraction": Variable(_PAIRS, "1", "fraction of the period in which the pair is open"),
     "friction_use": Variable(
@@ -68,8 +76,12 @@ OF_SAMPLES = (
 FOLLOWED_FREQUENCY = ("excitation_frequency", "excitation_frequency_error")
 """Further ones of a study that names none and whose frequency follows the resonance."""
 
+OF_EVOLUTION = ("dissipated_energy", "dissipated_energy_error", "pair_friction", "pair_stiffness")
+"""Further ones of a study that names none and has [wear.evolution]."""
+
 OF_SAMPLES_ALONE = ("wear_depth_max", "wear_depth_max_error", "wear_depth_last")
-USUAL = tuple(name for name in ASKED if name not in (*OF_SAMPLES_ALONE, *FOLLOWED_FREQUENCY, "friction_power"))
+_SELDOM = (*OF_SAMPLES_ALONE, *FOLLOWED_FREQUENCY, *OF_EVOLUTION, "friction_power")
+USUAL = tuple(name for name in ASKED if name not in _SELDOM)
 """Those of other studies that name none."""
 
 LOOPS = {

@@ -1,6 +1,7 @@
 """Study of wear -> sweeps, and histories from their start states; which points share a history, and why.
 
-The rates of all wear laws but "power" are proportional to the wear coefficient: dW/dt = k_w f(W), Eq. (7). With s k_w
+The rates of all wear laws but "power" are proportional to the wear coefficient, where the contact does not change with
+the energy that friction dissipates: dW/dt = k_w f(W), Eq. (7). With s k_w
 in place of k_w the same states follow each other, each at the cycle count t / s. Where the scheme chooses its steps, a
 task integrates the history of the largest k_w; the others are read from this one at the counts s t.
 """
@@ -247,11 +248,12 @@ def _group(study: Study, point: _Values) -> tuple[str, Hashable]:
     if study.solver.shortcuts:
         if study.output_counts[-1] == 0.0:
             return "cycles", point.wear_coefficient
-        if point.wear_coefficient == 0.0:
+        if point.wear_coefficient == 0.0 and not study.evolving:
             return "unworn", 0.0
         if point.scheme in OWN_STEPS:
-            # the rate of the law "power" is not proportional to the wear coefficient
-            return point.scheme, point.wear_coefficient if study.wear.law == "power" else None
+            # the rate of the law "power" is not proportional to the wear coefficient, nor is that of an evolution
+            own = study.wear.law == "power" or study.evolving
+            return point.scheme, point.wear_coefficient if own else None
         if point.scheme == "explicit" and study.slow_time.largest_depth is not None:
             # the last of the steps by Eq. (22) is shortened, so that other wear coefficients have other histories
             return "largest_depth", point.wear_coefficient
