@@ -43,6 +43,10 @@ TANGENTIAL_RATIO = 2.0 * (1.0 - 0.3) / (2.0 - 0.3)
 """Tangential over normal contact stiffness (`solver.compliant_contact`): Mindlin's ratio for Poisson's ratio 0.3."""
 
 
+EVOLVING = ("friction_coefficient", "contact_stiffness", "wear_factor")
+"""What may change with the dissipated energy, as `Evolution` has it."""
+
+
 @dataclass(frozen=True)
 class Evolution(_ByRows):
     """How the contact of pairs changes with the energy e that friction has dissipated there over their area, J/m2.
@@ -142,6 +146,12 @@ class ContactInterface(_ByRows):
         coefficient = self.friction_coefficient if friction is None else friction[0]
         return replace(self, evolution=evolved, friction_coefficient=coefficient)
 
+    @cached_property
+    def evolves(self) -> bool:
+        """Whether any property of a pair that rubs changes with the dissipated energy."""
+        tables = [getattr(self.evolution, name, None) for name in EVOLVING]
+        return any(table is not None and bool(np.diff(table, axis=1)[self.rubs].any()) for table in tables)
+
     def _slope(self, name: str) -> FloatArray:
         found = self.evolution and self.evolution.now(name)
         return np.where(self.rubs, found[1], 0.0) if found else np.zeros(self.n_contact)
@@ -174,7 +184,7 @@ class ContactInterface(_ByRows):
     def relative_change(self, energy: FloatArray) -> float:
         """Largest relative change of what the contact is now by a change of the energy (n_contact,), J/m2."""
         largest = 0.0
-        for name in ("friction_coefficient", "contact_stiffness", "wear_factor"):
+        for name in EVOLVING:
             found = self.evolution and self.evolution.now(name)
             if found:
                 largest = max(largest, float(np.abs(found[1] * energy / found[0])[self.rubs].max(initial=0.0)))

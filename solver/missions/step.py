@@ -106,7 +106,7 @@ def attempt_step(
     slow_now = energy.ravel(), energy_rates.ravel()
     end = Node(now.count + length, growth.ravel(), rates.ravel(), values, guides, *slow_now)
     ratio = float(error @ area) / most
-    if contact.evolution and length > 1:
+    if contact.evolves and length > 1:
         heat = float(slow[1].sum(axis=0) @ area), float(energy.sum(axis=0) @ area)
         ratio = max(ratio, float(energy_error @ area) / allowed_error(share, *heat, now.count, length))
     return MissionStep(end, results, math.inf if math.isnan(ratio) else ratio)

@@ -69,7 +69,7 @@ def attempt_step(wearing: WearingJoint, state: WearState, length: float, scheme:
         own, other = (1.0 + w) ** 2 / (6.0 * w * (1.0 + 2.0 * w)), (1.0 + 1.0 / w) / 6.0
         error = own / (own + other) * (end.at.slow - explicit)
     worn, heat = (float(each @ wearing.area) for each in np.abs(error))
-    last = LastStep(state.point, length, worn, heat if wearing.case.model.contact.evolution else 0.0)
+    last = LastStep(state.point, length, worn, heat if wearing.case.model.contact.evolves else 0.0)
     return replace(end, cycle=state.cycle + length, last=last)
 
 
