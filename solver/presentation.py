@@ -18,6 +18,8 @@ _UNITS = {
     "m": "wear_depth wear_depth_error slip_range response response_mean response_peak shape loop_displacement"
     " response_begin response_end response_peak_begin response_peak_end",
     "Pa": "mean_pressure",
+    "J/m2": "dissipated_energy dissipated_energy_error",
+    "N/m3": "pair_stiffness",
     "W/m2": "friction_power",
     "N": "loop_force excitation_amplitude",
     "Hz": "frequency frequency_error fold_frequency excitation_frequency excitation_frequency_error",
@@ -25,7 +27,8 @@ _UNITS = {
     "m kg^0.5": "amplitude",
 }
 _DIMENSIONS = {
-    "contact": "wear_depth wear_depth_error mean_pressure slip_range open_fraction friction_power slip_fraction",
+    "contact": "wear_depth wear_depth_error mean_pressure slip_range open_fraction friction_power slip_fraction"
+    " dissipated_energy dissipated_energy_error pair_friction pair_stiffness",
     "response": "response response_mean response_peak",
     "displacement": "shape",
     "loop phase component": "loop_displacement loop_force",

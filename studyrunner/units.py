@@ -31,6 +31,8 @@ _SCALES: dict[str, tuple[tuple[float, float, str], ...]] = {
     ),
     "m3 per mission": ((1e-4, 1.0, "m³ per mission"), (1e-13, 1e9, "mm³ per mission"), (0.0, 1e18, "µm³ per mission")),
     "Pa": ((2e9, 1e-9, "GPa"), (0.1e6, 1e-6, "MPa"), (100.0, 1e-3, "kPa"), (0.0, 1.0, "Pa")),
+    "J/m2": ((2e5, 1e-6, "MJ/m²"), (200.0, 1e-3, "kJ/m²"), (0.0, 1.0, "J/m²")),
+    "N/m3": ((0.0, 1e-12, "MPa/µm"),),
     "N": ((5e3, 1e-3, "kN"), (0.1, 1.0, "N"), (0.0, 1e3, "mN")),
     "cycles": ((5e6, 1e-6, "Mcycles"), (5e3, 1e-3, "kcycles"), (0.0, 1.0, "cycles")),
     "m kg^0.5": ((0.0, 1.0, "m√kg"),),

@@ -32,7 +32,7 @@ from studyrunner.user_error import UserError, Verbatim
 
 MESH = ("mesh_x", "mesh_y", "mesh_z", "mesh_quad")
 
-FIELDS = ("wear_depth", "mean_pressure", "slip_range", "open_fraction")
+FIELDS = ("wear_depth", "mean_pressure", "slip_range", "open_fraction", "dissipated_energy")
 """Variables of the contact pairs that the files hold at the nodes in contact, where the result has them."""
 
 SERIES = "root.pvd"

@@ -20,6 +20,7 @@ FIGURES = (
     *OF_WEAR,
     Entry("frequency_response", "Frequency response of one joint, new and worn", draw_responses, needs=_NEEDED),
     Entry("excitation_frequency", "Frequency of the followed resonance", wear.draw_excitation, caption=BANDS),
+    Entry("evolution", "Contact that changes with the dissipated energy", wear.draw_evolution, **ONE),
     *OF_POINTS,
     Entry("mean_pressure", "Mean pressure", pairs.draw_pressure, needs=("mean_pressure",), **ONE),
     Entry("fretting_loops", "Fretting loops", draw_loops, "fretting_loops", caption=_LOOPS, **ONE),

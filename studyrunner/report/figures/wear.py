@@ -13,7 +13,7 @@ from studyrunner.report.drawing import Drawn, FloatArray
 from studyrunner.result.view import NO_VOLUME, Point, Result
 from studyrunner.units import Scale, scale_for, show_known, show_percent
 
-_MOST_LINES, _MOST_MAPS = 6, 4
+_MOST_LINES, _MOST_MAPS, _MOST_PAIRS = 6, 4, 4
 _LARGE: dict[str, Any] = {"linestyle": "none", "markersize": 9, "markerfacecolor": "none", "color": "black"}
 
 
@@ -52,6 +52,40 @@ def draw_excitation(result: Result) -> Drawn:
     _draw_over_cycles(result, panel, "excitation_frequency", choice, Scale(1.0, "Hz"))
     panel.set_ylabel("frequency (Hz)")
     return figure, f"The excitation follows the {result.followed}", choice.sentence
+
+
+_EVOLVING = {
+    "pair_friction": "friction coefficient",
+    "pair_stiffness": "contact stiffness",
+    "dissipated_energy": "dissipated energy",
+}
+"""What a figure of an evolving contact shows, by variable."""
+
+
+def draw_evolution(result: Result) -> Drawn:
+    """Friction, contact stiffness and dissipated energy over cycles of the pairs that wear most, at the shown point;
+    nothing where no contact evolves.
+    """
+    if "evolution" not in result.study.get("wear", {}) or len(result.cycles) == 1:
+        return None
+    values = {name: result.at(name, result.shown).values for name in _EVOLVING if result.has(name)}
+    # a stiffness of the scene does not evolve
+    values = {name: each for name, each in values.items() if np.isfinite(each).any()}
+    if not result.has("wear_depth") or not values:
+        return result.lacks("wear_depth", "dissipated_energy")
+    depth = result.at("wear_depth", result.shown).values[result.last_reached(result.shown)]
+    pairs = np.argsort(-depth, kind="stable")[:_MOST_PAIRS]
+    cycles = scale_for(result.counted, result.cycles)
+    figure, panels = plot.new_panels(1, len(values), 2.8)
+    for panel, (name, each) in zip(np.ravel(panels), values.items(), strict=True):
+        scale = scale_for(str(result.dataset[name].attrs["units"]), each[np.isfinite(each)])
+        for number, pair in enumerate(pairs):
+            look = plot.line_style(number, 101) | {"label": f"pair {pair}"}
+            panel.plot(cycles(result.counts(result.shown)), scale(each[:, pair]), **look)
+        panel.set_xlabel(selection.slow_time(result, cycles))
+        panel.set_ylabel(scale.label(_EVOLVING[name]))
+        plot.set_from_zero(panel)
+    return figure, f"The {pairs.size} pairs that wear most"
 
 
 def _at_the_end(result: Result) -> str:
