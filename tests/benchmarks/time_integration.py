@@ -2,6 +2,7 @@
 
 `python -m tests.benchmarks.time_integration [--mesh 1] [--frequency 212.42] [--each 20] [--steps 250]` prints worn
 volume and tip amplitude of the bundled dovetail root; `--single 16000` takes the first cycles one by one.
+`--friction 0.3 --energy 0 1e5 --frictions 0.3 0.5` lets the friction of a pair rise with the energy that it dissipates.
 `--approach ramp --periods 50 --cycles 0` shows the unworn motion after a fast ramp, `--sectors 48 --diameter 16 --steps
 120` a travelling wave on three sectors, after which it repeats. Nothing of the solver is used but the model.
 
@@ -297,18 +298,24 @@ def loaded(model: ReducedModel, friction: float, course: FloatArray, n_steps: in
 
 def wear(
     model: ReducedModel, structure: Structure, motion: Motion, wear_coefficient: float, each: float, cycles: float,
-    single: float = 0.0,
-) -> Iterator[tuple[float, FloatArray, Motion]]:  # fmt: skip
-    """Cycle count, depths (n_contact,), m, and motion after each period, in which the joint wears `each` cycles.
+    single: float = 0.0, evolution: tuple[list[float], list[float]] = ([0.0], [np.nan]),
+) -> Iterator[tuple[float, FloatArray, FloatArray, Motion]]:  # fmt: skip
+    """Cycle count, depths, m, dissipated energies, J/m2 (n_contact,), and motion after each period, in which the joint
+    wears `each` cycles.
 
-    single: cycles at the beginning, each of which is a period by itself.
+    single: cycles at the beginning, each of which is a period by itself. evolution: energies, J/m2, and the friction
+    coefficients of a pair there, linear between; NaN: that of the structure.
     """
-    depth, cycle, work = np.zeros(model.contact.n_contact), 0.0, motion.work
+    energy = depth = np.zeros(model.contact.n_contact)
+    cycle, work = 0.0, motion.work
     amplitude, change, ahead = amplitude_of_mode(structure, motion), 0.0j, _AHEAD
     while cycle < cycles * (1.0 - 1e-12):
         taken = min(each if cycle >= single else 1.0, cycles - cycle)
         moved = one_period(structure, motion, model.contact.gap + depth)
-        depth = depth + taken * wear_coefficient * 0.5 * (work + moved.work) / model.contact.area
+        slipped = taken * 0.5 * (work + moved.work) / model.contact.area
+        depth, energy = depth + wear_coefficient * slipped, energy + structure.limits * slipped
+        friction = np.interp(energy, *evolution)
+        structure = structure._replace(limits=np.where(np.isnan(friction), structure.limits, friction))
         cycle, work, here, before = cycle + taken, moved.work, amplitude_of_mode(structure, moved), change
         change = here - amplitude
         # a worn joint has another resonance than a glued one: beside it the beat of the mode would grow
@@ -316,7 +323,7 @@ def wear(
         # at most the cycles for which the period stands: a cycle by itself is integrated as it is
         ahead = min(max(0.8 * ahead, 1.0) if beats else 1.1 * ahead, _AHEAD, max(taken, 1.0))
         motion, amplitude = push_mode(structure, moved, (ahead - 1.0) * change), here + (ahead - 1.0) * change
-        yield cycle, depth, motion
+        yield cycle, depth, energy, motion
 
 
 def first_harmonic(structure: Structure, motion: Motion, rows: FloatArray) -> np.ndarray:
@@ -328,7 +335,7 @@ def first_harmonic(structure: Structure, motion: Motion, rows: FloatArray) -> np
 def main() -> None:
     given = arguments(
         __doc__, mesh=1, steps=250, periods=1000, sectors=47, diameter=0, frequency=212.42, each=20.0, single=0.0,
-        cycles=1e5, amplitude=0.5, friction=0.5, approach="up",
+        cycles=1e5, amplitude=0.5, friction=0.5, approach="up", energy=[0.0], frictions=[np.nan],
     )  # fmt: skip
     model = build_scene("dovetail_sector", mesh=given.mesh, n_sectors=given.sectors, nodal_diameter=given.diameter)
     n_apart = 1
@@ -340,18 +347,20 @@ def main() -> None:
     began = time.process_time()
     structure, motion = loaded(model, given.friction, course, given.steps)
     rows = np.real(model.linear[0].response)
-    table = Table("cycles", "tip, mm", "worn, mm3", "slip work, J", "CPU s")
+    table = Table("cycles", "tip, mm", "worn, mm3", "slip work, J", "dissipated, J", "CPU s")
 
-    def row(cycle: float, now: Motion, depth: FloatArray) -> None:
-        numbers = (1e9 * depth @ model.contact.area / n_apart, now.work.sum() / n_apart, time.process_time() - began)
+    def row(cycle: float, now: Motion, *slow: FloatArray) -> None:
+        worn, dissipated = (float(each @ model.contact.area) / n_apart for each in slow)
+        numbers = 1e9 * worn, now.work.sum() / n_apart, dissipated, time.process_time() - began
         table.row(f"{cycle:.0f}", 1e3 * float(abs(first_harmonic(structure, now, rows)[0])), *map(float, numbers))
 
-    row(0.0, motion, np.zeros(model.contact.n_contact))
-    shown = 0.05 * given.cycles
-    for cycle, depth, now in wear(model, structure, motion, 1.1e-11, given.each, given.cycles, given.single):
+    row(0.0, motion, *np.zeros((2, model.contact.n_contact)))
+    shown, evolution = 0.05 * given.cycles, (given.energy, given.frictions)
+    asked = structure, motion, 1.1e-11, given.each, given.cycles, given.single, evolution
+    for cycle, depth, energy, now in wear(model, *asked):
         if cycle >= shown * (1.0 - 1e-12):
             shown += 0.05 * given.cycles
-            row(cycle, now, depth)
+            row(cycle, now, depth, energy)
 
 
 if __name__ == "__main__":

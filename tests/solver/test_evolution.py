@@ -7,7 +7,7 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq
 
-from solver import build_model, with_contact_stiffness, with_evolution
+from solver import Block, build_model, integrate_mission, with_contact_stiffness, with_evolution
 from solver.accuracy.certificate import certify
 from solver.contact.wear_law import WearLaw, WearTable
 from solver.harmonic_balance.state import first_response
@@ -233,3 +233,17 @@ def test_a_stiffer_contact_is_that_of_a_stiffer_structure():
     for one, other in zip(*found, strict=True):
         # the penalty is that of the unworn joint, and with it the harmonics that are left out
         assert one == pytest.approx(other, rel=3e-3, abs=3e-3 * np.abs(other).max())
+
+
+def test_missions_dissipate_as_the_cycles_of_their_blocks():
+    """A thousand missions of 100 cycles, few of which are computed."""
+    first, last = 0.1, 0.5
+    model, omega = driven([0.0, 4e6], friction_coefficient=[first, last])
+    block = Block(model, omega / (2.0 * np.pi), 1.0, None, cycles=100.0)
+    settings = replace(GIVEN, samples=512)
+    found = integrate_mission([block], 1e-12, (0, 1, 10, 100, 1000), settings=settings)
+    slope = (last - first) / 4e6
+    exact = first * np.expm1(slope * PER_CYCLE * 100.0 * found.missions) / slope
+    assert found.steps.size < 200
+    assert found.dissipated_energy[:, 0] == pytest.approx(exact, rel=2e-4)
+    assert (np.abs(found.dissipated_energy[:, 0] - exact) <= found.dissipated_energy_error[:, 0] + 1e-4 * exact).all()
