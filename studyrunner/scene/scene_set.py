@@ -51,10 +51,8 @@ def find_scenes(study: Study) -> SceneSet:
     for own in points.studies:
         keys.append([])
         for each in own.block_studies or (own,):
-            scene, harmonics = each.scene, harmonics_to_build(each)
-            files = None if scene.files is None else [str(path) for path in scene.files.all]
-            where = None if scene.path is None else str(scene.path), scene.group, files
-            keys[-1].append(json.dumps([scene.model, scene.of_model, where, harmonics], sort_keys=True))
+            files = [str(path) for path in each.scene.source.files]
+            keys[-1].append(json.dumps([each.scene.of_model, files, harmonics_to_build(each)], sort_keys=True))
             studies.setdefault(keys[-1][-1], each)
     if study.outputs.scene and len(studies) > 1:
         remedy = f"leave it out: the study has {len(studies)} scenes, and a result keeps one"

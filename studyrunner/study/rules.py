@@ -80,7 +80,7 @@ def _outputs(study: Study) -> Iterator[Wrong]:
         remedy = ""
         if name not in (DEFAULT, *study.kind.always, *known):
             remedy = f"give {nearest_name(name, known)}, for {study.kind.words}"
-        elif name in ("mesh", "exact") and (name not in study.scene.offers or (name == "exact" and no_exact)):
+        elif name in ("mesh", "exact") and (name not in study.scene.source.offers or (name == "exact" and no_exact)):
             remedy = f"leave it out: the scene {study.scene.model} has none"
             remedy += ", or not with these frequencies, cycle counts and pairs" if name == "exact" else ""
         elif name == "natural_frequency" and "nodal_diameter" in study.dimensions and name in study.scene_variables:

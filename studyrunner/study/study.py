@@ -79,10 +79,9 @@ class Study(Section):
     @property
     def files(self) -> tuple[Path, ...]:
         """Files that a run of the study reads."""
-        scene = self.scene
-        worn = scene.worn.result if scene.worn else ""
-        found = [self.folder / Path(self.source).name, *(scene.files.all if scene.files else ())]
-        return (*found, *([scene.path] if scene.path else ()), *([self.folder / worn] if worn else ()))
+        worn = self.scene.worn.result if self.scene.worn else ""
+        own = self.folder / Path(self.source).name
+        return (own, *self.scene.source.files, *([self.folder / worn] if worn else ()))
 
     @property
     def friction_coefficient(self) -> float | None:

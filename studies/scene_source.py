@@ -1,0 +1,370 @@
+"""Where the reduced model of a scene comes from: the program, a scene file, a finite-element model, or a result.
+
+What reads files is loaded where there are some: it takes a while to load. What functions do stands in `SceneSource`.
+"""
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+from typing import Any, ClassVar
+
+from pydantic import BaseModel, Field
+
+from solver.model import FloatArray, ReducedModel
+from studies.fe_models.files import ModelFiles, check_there, file_digest
+from studies.scene import (
+    ContactStiffness,
+    ExpectedWear,
+    Progress,
+    SurfaceMesh,
+    Table,
+    as_scene,
+    make_compliant,
+    stuck_frequencies,
+)
+from studies.scenes import build_scene, scene_parameters
+
+Check = tuple[list[tuple[str, str]], Callable[[Path], None]]
+"""Label and text of each line on a finite-element model, and what draws its contact pairs."""
+
+
+@dataclass(frozen=True)
+class SceneSource(ABC):
+    """A source of scenes, whatever their parameters.
+
+    model: name or path, as the study has it. folder: relative paths start here.
+
+    Functions that take parameters, an object of the class `parameters`, or read files raise SceneError where these are
+    wrong, and OSError where a file cannot be read.
+    """
+
+    model: str
+    folder: Path
+
+    @property
+    def is_bundled(self) -> bool:
+        """Whether the program builds it from the parameters alone."""
+        return False
+
+    @property
+    def friction_place(self) -> str:
+        """Where it may hold a friction coefficient for each pair, in place of the study; empty where nowhere."""
+        return ""
+
+    @property
+    @abstractmethod
+    def parameters(self) -> type[BaseModel]:
+        """What [scene] consists of beside `model`; has `friction_coefficient`."""
+
+    @abstractmethod
+    def build(self, parameters: BaseModel, least: int, n_harmonics: int, progress: Progress) -> ReducedModel:
+        """Reduced model, with the nodal diameters that the harmonics 0..n_harmonics see; of a file those that it holds,
+        which are at least those of the harmonics 0..least.
+        """
+
+    @property
+    def path(self) -> Path | None:
+        """The file that holds the reduced model."""
+        return None
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """All files that are read."""
+        return ()
+
+    @property
+    def offers(self) -> tuple[str, ...]:
+        """What a study may ask for beside what all scenes have: "mesh", "exact"."""
+        return ()
+
+    @property
+    def usual(self) -> Mapping[str, float]:
+        """Numbers above 0 of a usual scene, by key; those of files have none."""
+        return {}
+
+    def found(self, parameters: BaseModel) -> "SceneSource":
+        """The source with its files, once it is known that they are there."""
+        del parameters
+        return self
+
+    def of_model(self, parameters: BaseModel) -> dict[str, Any]:
+        """Parameters that the reduced model depends on: mostly without one friction coefficient of all pairs."""
+        given: dict[str, Any] = parameters.model_dump(mode="json")
+        if not isinstance(given["friction_coefficient"], dict):
+            del given["friction_coefficient"]
+        return given
+
+    def describe(self, parameters: BaseModel) -> dict[str, str]:
+        """Attributes of a scene or result file, see `studies.scene_file.DESCRIPTION`."""
+        del parameters
+        return {}
+
+    def key(self, parameters: BaseModel) -> tuple[object, ...]:
+        """All that the reduced model depends on, contents of files included, beside its harmonics."""
+        content = None if self.path is None else file_digest(self.path)
+        return self.model, self.of_model(parameters), self.describe(parameters), content
+
+    def mesh(self, parameters: BaseModel) -> SurfaceMesh | None:
+        """Outer faces, None of a source that does not offer them."""
+        del parameters
+        return None
+
+    def natural_frequencies(self, parameters: BaseModel, model: ReducedModel) -> dict[int, FloatArray]:
+        """Of its model, as `stuck_frequencies`, for all nodal diameters that are known."""
+        del parameters
+        return stuck_frequencies(model)
+
+    def with_room_for_wear(self, parameters: BaseModel, expected: ExpectedWear) -> BaseModel:
+        """Parameters with room for what a study wears, where it is built with such."""
+        del expected
+        return parameters
+
+    def remarks(self) -> tuple[tuple[str, str], ...]:
+        """Label and text of each line on what was skipped in files, or read in one of two ways."""
+        return ()
+
+    def check(self, parameters: BaseModel, n_harmonics: int, progress: Progress) -> Check | None:
+        """What is to be said of a finite-element model; None of others."""
+        del parameters, n_harmonics, progress
+        return None
+
+
+@dataclass(frozen=True)
+class Bundled(SceneSource):
+    """A bundled scene."""
+
+    @property
+    def is_bundled(self) -> bool:
+        return True
+
+    @property
+    def parameters(self) -> type[BaseModel]:
+        return scene_parameters(self.model)
+
+    @property
+    def offers(self) -> tuple[str, ...]:
+        return scene_parameters(self.model).OFFERS
+
+    @property
+    def usual(self) -> Mapping[str, float]:
+        defaults = {name: field.default for name, field in self.parameters.model_fields.items()}
+        return {name: value for name, value in defaults.items() if isinstance(value, float) and value > 0.0}
+
+    def of_model(self, parameters: BaseModel) -> dict[str, Any]:
+        if as_scene(parameters).FRICTION_IN_MODEL:
+            return parameters.model_dump(mode="json")
+        return super().of_model(parameters)
+
+    def describe(self, parameters: BaseModel) -> dict[str, str]:
+        return dict(as_scene(parameters).DESCRIPTION)
+
+    def build(self, parameters: BaseModel, least: int, n_harmonics: int, progress: Progress) -> ReducedModel:
+        del least, progress
+        return build_scene(self.model, parameters, n_harmonics)
+
+    def mesh(self, parameters: BaseModel) -> SurfaceMesh | None:
+        return as_scene(parameters).describe_mesh() if "mesh" in self.offers else None
+
+    def natural_frequencies(self, parameters: BaseModel, model: ReducedModel) -> dict[int, FloatArray]:
+        return as_scene(parameters).natural_frequencies(model)
+
+    def with_room_for_wear(self, parameters: BaseModel, expected: ExpectedWear) -> BaseModel:
+        return as_scene(parameters).with_room_for_wear(expected)
+
+
+class SceneFileParameters(Table):
+    """[scene] of a scene file: the friction coefficient only, if the file has none for each pair."""
+
+    AXES: ClassVar = ("friction_coefficient", "contact_stiffness")
+
+    friction_coefficient: float | None = Field(None, ge=0, description="a number, 0 or more")
+    contact_stiffness: ContactStiffness = None
+
+
+class _InFile(SceneSource):
+    """A reduced model in a file."""
+
+    @property
+    @abstractmethod
+    def path(self) -> Path: ...
+
+    @property
+    def group(self) -> str:
+        """Where it stands in a file that holds more."""
+        return ""
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        return (self.path,)
+
+    @cached_property
+    def offers(self) -> tuple[str, ...]:
+        return ("mesh",) if self._read_mesh() is not None else ()
+
+    def mesh(self, parameters: BaseModel) -> SurfaceMesh | None:
+        del parameters
+        return self._read_mesh() if "mesh" in self.offers else None
+
+    def _read_mesh(self) -> SurfaceMesh | None:
+        from studies.scene_file import read_mesh
+
+        return read_mesh(self.path, self.group)
+
+    def describe(self, parameters: BaseModel) -> dict[str, str]:
+        from studies.scene_file import read_description
+
+        del parameters
+        return read_description(self.path)
+
+    def build(self, parameters: BaseModel, least: int, n_harmonics: int, progress: Progress) -> ReducedModel:
+        from studies.scene_file import read_scene
+
+        del parameters, n_harmonics, progress
+        return read_scene(self.path, least, self.group)
+
+
+@dataclass(frozen=True)
+class SceneFile(_InFile):
+    """A scene file."""
+
+    @property
+    def parameters(self) -> type[SceneFileParameters]:
+        return SceneFileParameters
+
+    @property
+    def path(self) -> Path:
+        return self.folder / self.model
+
+    @property
+    def friction_place(self) -> str:
+        return "contact/friction_coefficient in the scene file"
+
+    def found(self, parameters: BaseModel) -> SceneSource:
+        del parameters
+        check_there(self.path)
+        return self
+
+    def build(self, parameters: BaseModel, least: int, n_harmonics: int, progress: Progress) -> ReducedModel:
+        model = super().build(parameters, least, n_harmonics, progress)
+        return make_compliant(model, dict(parameters)["contact_stiffness"])
+
+
+@dataclass(frozen=True)
+class InResult(_InFile):
+    """A scene that a result holds, as it was computed with. of: its source. place: file of the result, and group."""
+
+    of: SceneSource
+    place: tuple[Path, str]
+
+    @property
+    def path(self) -> Path:
+        return self.place[0]
+
+    @property
+    def group(self) -> str:
+        return self.place[1]
+
+    @property
+    def parameters(self) -> type[BaseModel]:
+        return self.of.parameters
+
+    @property
+    def is_bundled(self) -> bool:
+        return self.of.is_bundled
+
+    @property
+    def friction_place(self) -> str:
+        return self.of.friction_place
+
+    @cached_property
+    def offers(self) -> tuple[str, ...]:
+        return self.of.offers if self.is_bundled else super().offers
+
+    @property
+    def usual(self) -> Mapping[str, float]:
+        return self.of.usual
+
+    def of_model(self, parameters: BaseModel) -> dict[str, Any]:
+        return self.of.of_model(parameters)
+
+    def natural_frequencies(self, parameters: BaseModel, model: ReducedModel) -> dict[int, FloatArray]:
+        return self.of.natural_frequencies(parameters, model)
+
+
+@dataclass(frozen=True)
+class FiniteElements(SceneSource):
+    """A deck, a mesh or a table of nodes, with or without matrices. found_files: None until they are looked for."""
+
+    found_files: ModelFiles | None = None
+
+    @property
+    def parameters(self) -> type[BaseModel]:
+        from studies.fe_models.from_files.parameters import Parameters
+
+        return Parameters
+
+    @property
+    def _files(self) -> ModelFiles:
+        assert self.found_files is not None, "of a source that was found"
+        return self.found_files
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        return self._files.all
+
+    @property
+    def offers(self) -> tuple[str, ...]:
+        return ("mesh",) if self._files.has_faces else ()
+
+    def found(self, parameters: BaseModel) -> SceneSource:
+        from studies.fe_models.from_files.model import checked, find_files
+
+        return replace(self, found_files=find_files(self.folder, self.model, checked(parameters)))
+
+    def describe(self, parameters: BaseModel) -> dict[str, str]:
+        from studies.fe_models.from_files.model import describe_origin
+
+        return describe_origin(self._files, parameters)
+
+    def build(self, parameters: BaseModel, least: int, n_harmonics: int, progress: Progress) -> ReducedModel:
+        from studies.fe_models.from_files.model import build
+
+        del least
+        return build(self._files, parameters, n_harmonics, progress)
+
+    def mesh(self, parameters: BaseModel) -> SurfaceMesh | None:
+        from studies.fe_models.from_files.model import describe_model_mesh
+
+        return describe_model_mesh(self._files, parameters) if "mesh" in self.offers else None
+
+    def remarks(self) -> tuple[tuple[str, str], ...]:
+        from studies.fe_models.meshes import read_mesh_file
+
+        return read_mesh_file(self._files.mesh).remarks
+
+    def check(self, parameters: BaseModel, n_harmonics: int, progress: Progress) -> Check | None:
+        from studies.fe_models.from_files.check import describe_model, draw_pairs
+        from studies.fe_models.from_files.model import checked, load_model, reduce_model
+
+        loaded = load_model(self._files, checked(parameters), progress)
+        scene = reduce_model(loaded, n_harmonics, progress)
+        rows = [("files", self.describe(parameters)["model_files"]), *describe_model(loaded, scene, progress)]
+        return rows, lambda picture: draw_pairs(loaded, scene, picture)
+
+
+def source_of(model: str, folder: Path, *, in_result: bool = False) -> SceneSource:
+    """The source that a name or path stands for: a bundled scene, or a file, which is there.
+
+    folder: relative paths start here. in_result: whether a result may hold the scene in place of the file. Raises
+    SceneError.
+    """
+    suffix = Path(model).suffix.lower()
+    is_deck = suffix in (".inp", ".msh", ".cdb", ".csv")
+    if not is_deck and not ("/" in model or "\\" in model or suffix in (".h5", ".hdf5", ".he5")):
+        scene_parameters(model)
+        return Bundled(model, folder)
+    if not in_result:
+        check_there(folder / model)
+    return FiniteElements(model, folder) if is_deck else SceneFile(model, folder)
