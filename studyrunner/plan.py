@@ -205,7 +205,7 @@ def _frequencies(study: Study, parts: Sequence[Study]) -> list[float]:
     """Frequencies of the excitation that the study gives in Hz."""
     if not study.kind.counted or study.axes.frequency_ratio:
         return []
-    own = [value for part in parts if not (study.mission and part.mission) for value in part.axes.frequency]
+    own = [value for part in parts if not part.block_studies for value in part.axes.frequency]
     return own + [end for block in study.mission if block.passage for end in (block.passage.start, block.passage.stop)]
 
 

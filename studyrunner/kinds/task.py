@@ -334,9 +334,7 @@ def with_tasks(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]) -> P
     """
     points, limit = scenes.points, math.inf if study.solver.time_limit is None else study.solver.time_limit
     parts = zip(points.studies, scenes.of_blocks, contact_changes(study, scenes, facts), strict=True)
-    joints = [
-        tuple(map(joint_of, own.block_studies or (own,), numbers, of_blocks)) for own, numbers, of_blocks in parts
-    ]
+    joints = [tuple(map(joint_of, own.parts, numbers, of_blocks)) for own, numbers, of_blocks in parts]
 
     def settings(*values: Any) -> SolverSettings:
         return SolverSettings(**dict(zip(SOLVER_AXES, values, strict=True)), time_limit=limit)

@@ -22,7 +22,7 @@ def with_room_for_wear(study: Study) -> Study:
     sample has (`samples_of`). Blocks of a mission have room for the wear of all of them, in equal pairs.
     """
     scene, parameters = study.scene, dict(study.scene.parameters)
-    if study.mission:
+    if study.block_studies:
         return study.model_copy(update={"block_studies": _with_room_in_blocks(study)})
     own_scenes = study.scatter is not None and study.scatter.inputs.keys() & parameters.keys()
     if own_scenes:

@@ -168,6 +168,13 @@ def complete(study: Study, given: Mapping[str, Any], origin: Origin) -> Study:
                 raise UserError(source, key, block.engine_order, remedy)
             own["frequency"] = (block.engine_order * float(speed) / 60.0,)
         axes = study.axes.model_copy(update={"frequency": study.axes.frequency or (IDLE_FREQUENCY,), **own})
-        alone = {"kind": WEAR, "tables": {}, "slow_time": SlowTimeSection(), "scene": of_block, "axes": axes}
+        alone = {
+            "kind": WEAR,
+            "tables": {},
+            "block": block.name,
+            "slow_time": SlowTimeSection(),
+            "scene": of_block,
+            "axes": axes,
+        }
         studies.append(study.model_copy(update=alone))
     return study.model_copy(update={"block_studies": tuple(studies)})
