@@ -19,7 +19,7 @@ def broken_rules(study: Study, first: bool) -> Iterator[Wrong]:
     """All that does not fit together. study: with its axes, without variants, and before it is complete. first: whether
     it is the first of the variants, which have the same axes.
     """
-    of_all = (_keys, study.kind.part("rules").broken_rules, _frequency, _amplitude) if first else ()
+    of_all = (_keys, study.kind.broken_rules, _frequency, _amplitude) if first else ()
     for rule in (*of_all, _outputs, _solver_and_end, _scatter, _evolution):
         yield from rule(study)
 
