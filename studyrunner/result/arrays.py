@@ -114,7 +114,7 @@ def _coordinate_entry(study: Study, name: str) -> Variable:
 def _worn_coordinate(study: Study, facts: Sequence[SceneFacts], points: Points) -> Iterator[SmallArray]:
     """Wear depths with which the histories begin; none where the study has several scenes or no worn one."""
     if study.scene.worn is not None and len(facts) == 1:
-        axes = [axis.name for axis in study.scene_axes if axis.key == ("worn",)]
+        axes = [axis.name for axis in study.scene_axes if axis.is_worn]
         names, values = points.along([scene_set.worn_depth(each, facts[0]) for each in points.studies], keep=axes)
         yield _of_scene("worn_depth", names, values)
 

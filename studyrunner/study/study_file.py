@@ -231,7 +231,7 @@ def format_study(study: Study) -> str:
     if study.allowable:
         axes["excitation_amplitude"] = sections.ALLOWABLE
     for axis in study.scene_axes:
-        if axis.key == ("worn",):
+        if axis.is_worn:
             continue
         given, place = tables[axis.table], {} if axis.name in designed else axes
         for name in axis.key[:-1]:
@@ -273,7 +273,7 @@ def _worn_states(study: Study) -> dict[str, object] | None:
     worn = study.scene.worn
     if worn is None:
         return None
-    counts = [count for axis in study.scene_axes if axis.key == ("worn",) for count in axis.values]
+    counts = [count for axis in study.scene_axes if axis.is_worn for count in axis.values]
     # the axis of worn states is the last one
     variants = study.variants[: len(counts)] if counts else (study,)
     depths = [list(each.scene.worn.depth[0]) for each in variants if each.scene.worn]

@@ -51,7 +51,7 @@ def _broken_rules(study: "Study") -> Iterator[Wrong]:
     """The amplitude goes up or down; each worn joint has a cycle count."""
     if "ramp" in study.axes.sweep:
         yield Wrong("axes.sweep", "ramp", 'give "up" or "down": the modal amplitude is raised or lowered')
-    if study.scene.worn is not None and not any(axis.key == ("worn",) for axis in study.scene_axes):
+    if study.scene.worn is not None and not any(axis.is_worn for axis in study.scene_axes):
         remedy = "missing: give the cycle count of each depth, the coordinate of the modes"
         yield Wrong("scene.worn.cycle", None, remedy)
 
