@@ -1,6 +1,5 @@
 """The tasks of a study, whatever its kind, what `--plan` says of them, and questions about values that are far off."""
 
-import itertools
 import math
 import time
 from collections import Counter
@@ -72,7 +71,7 @@ def plan_lines(study: Study, say: Callable[[str], None]) -> list[str]:
     built_with = largest_memory() - before
     plan, largest = build_tasks(study, scenes, facts), merge_facts(facts)
     seconds = time.process_time() + seconds_left
-    effort = effort_of(study, itertools.chain((sweep.work for sweep in plan.sweeps), plan.works))
+    effort = effort_of(study, plan.works)
     rows = [
         *_of_study(study, facts, plan, effort),
         *_of_effort(study, largest, plan, effort, built_with, seconds),

@@ -279,16 +279,21 @@ def digest(*values: object) -> str:
 class TaskPlan:
     """All tasks of a study.
 
-    make: the tasks that give the results of points; histories wait for a start state. works: what they take. sweeps:
-    the tasks that give start states. left_out: numbers of points that are not computed alone, by reason. n_points: of
-    the study.
+    make: the tasks that give the results of points; histories wait for a start state. make_sweeps: those that give
+    start states. works: what all of them take. left_out: numbers of points that are not computed alone, by reason.
+    n_points: of the study.
     """
 
     make: Callable[[], Iterator[Task]]
     works: Sequence[Work]
     left_out: Mapping[str, int]
     n_points: int
-    sweeps: tuple[Task, ...] = ()
+    make_sweeps: Callable[[], Iterator[Task]] = lambda: iter(())
+
+    @cached_property
+    def sweeps(self) -> tuple[Task, ...]:
+        """The tasks that give start states."""
+        return tuple(self.make_sweeps())
 
     @cached_property
     def results(self) -> tuple[Task, ...]:
@@ -302,7 +307,10 @@ class TaskPlan:
             names = task.hashes(identity)
             return replace(task, names=names, key=digest("task", names))
 
-        return replace(self, sweeps=tuple(map(with_names, self.sweeps)), make=lambda: map(with_names, self.make()))
+        of_sweeps, of_results = self.make_sweeps, self.make
+        return replace(
+            self, make_sweeps=lambda: map(with_names, of_sweeps()), make=lambda: map(with_names, of_results())
+        )
 
     @cached_property
     def waiting(self) -> Mapping[tuple[int, int] | None, Sequence[Task]]:
