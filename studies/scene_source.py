@@ -49,11 +49,6 @@ class SceneSource(ABC):
         return False
 
     @property
-    def friction_place(self) -> str:
-        """Where it may hold a friction coefficient for each pair, in place of the study; empty where nowhere."""
-        return ""
-
-    @property
     @abstractmethod
     def parameters(self) -> type[BaseModel]:
         """What [scene] consists of beside `model`; has `friction_coefficient`."""
@@ -72,7 +67,7 @@ class SceneSource(ABC):
     @property
     def files(self) -> tuple[Path, ...]:
         """All files that are read."""
-        return ()
+        return () if self.path is None else (self.path,)
 
     @property
     def offers(self) -> tuple[str, ...]:
@@ -86,7 +81,6 @@ class SceneSource(ABC):
 
     def found(self, parameters: BaseModel) -> "SceneSource":
         """The source with its files, once it is known that they are there."""
-        del parameters
         return self
 
     def of_model(self, parameters: BaseModel) -> dict[str, Any]:
@@ -98,7 +92,6 @@ class SceneSource(ABC):
 
     def describe(self, parameters: BaseModel) -> dict[str, str]:
         """Attributes of a scene or result file, see `studies.scene_file.DESCRIPTION`."""
-        del parameters
         return {}
 
     def key(self, parameters: BaseModel) -> tuple[object, ...]:
@@ -108,17 +101,14 @@ class SceneSource(ABC):
 
     def mesh(self, parameters: BaseModel) -> SurfaceMesh | None:
         """Outer faces, None of a source that does not offer them."""
-        del parameters
         return None
 
     def natural_frequencies(self, parameters: BaseModel, model: ReducedModel) -> dict[int, FloatArray]:
         """Of its model, as `stuck_frequencies`, for all nodal diameters that are known."""
-        del parameters
         return stuck_frequencies(model)
 
     def with_room_for_wear(self, parameters: BaseModel, expected: ExpectedWear) -> BaseModel:
         """Parameters with room for what a study wears, where it is built with such."""
-        del expected
         return parameters
 
     def remarks(self) -> tuple[tuple[str, str], ...]:
@@ -127,7 +117,6 @@ class SceneSource(ABC):
 
     def check(self, parameters: BaseModel, n_harmonics: int, progress: Progress) -> Check | None:
         """What is to be said of a finite-element model; None of others."""
-        del parameters, n_harmonics, progress
         return None
 
 
@@ -161,7 +150,6 @@ class Bundled(SceneSource):
         return dict(as_scene(parameters).DESCRIPTION)
 
     def build(self, parameters: BaseModel, least: int, n_harmonics: int, progress: Progress) -> ReducedModel:
-        del least, progress
         return build_scene(self.model, parameters, n_harmonics)
 
     def mesh(self, parameters: BaseModel) -> SurfaceMesh | None:
@@ -195,16 +183,11 @@ class _InFile(SceneSource):
         """Where it stands in a file that holds more."""
         return ""
 
-    @property
-    def files(self) -> tuple[Path, ...]:
-        return (self.path,)
-
     @cached_property
     def offers(self) -> tuple[str, ...]:
         return ("mesh",) if self._read_mesh() is not None else ()
 
     def mesh(self, parameters: BaseModel) -> SurfaceMesh | None:
-        del parameters
         return self._read_mesh() if "mesh" in self.offers else None
 
     def _read_mesh(self) -> SurfaceMesh | None:
@@ -215,13 +198,11 @@ class _InFile(SceneSource):
     def describe(self, parameters: BaseModel) -> dict[str, str]:
         from studies.scene_file import read_description
 
-        del parameters
         return read_description(self.path)
 
     def build(self, parameters: BaseModel, least: int, n_harmonics: int, progress: Progress) -> ReducedModel:
         from studies.scene_file import read_scene
 
-        del parameters, n_harmonics, progress
         return read_scene(self.path, least, self.group)
 
 
@@ -237,12 +218,7 @@ class SceneFile(_InFile):
     def path(self) -> Path:
         return self.folder / self.model
 
-    @property
-    def friction_place(self) -> str:
-        return "contact/friction_coefficient in the scene file"
-
     def found(self, parameters: BaseModel) -> SceneSource:
-        del parameters
         check_there(self.path)
         return self
 
@@ -273,10 +249,6 @@ class InResult(_InFile):
     @property
     def is_bundled(self) -> bool:
         return self.of.is_bundled
-
-    @property
-    def friction_place(self) -> str:
-        return self.of.friction_place
 
     @cached_property
     def offers(self) -> tuple[str, ...]:
@@ -331,7 +303,6 @@ class FiniteElements(SceneSource):
     def build(self, parameters: BaseModel, least: int, n_harmonics: int, progress: Progress) -> ReducedModel:
         from studies.fe_models.from_files.model import build
 
-        del least
         return build(self._files, parameters, n_harmonics, progress)
 
     def mesh(self, parameters: BaseModel) -> SurfaceMesh | None:

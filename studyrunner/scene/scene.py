@@ -107,12 +107,11 @@ def _wrong_beside(study: Study, model: ReducedModel) -> Iterator[Wrong]:
     """What of a study does not fit to the pairs of its scene."""
     contact, friction, loops = model.contact, study.friction_coefficient, study.outputs.loops
     given = contact.friction_coefficient is not None
-    own = "friction_coefficient" in study.evolving
-    file = study.scene.source.friction_place
-    if file and own and given:
+    own, file = "friction_coefficient" in study.evolving, "contact/friction_coefficient in the scene file"
+    if study.scene.source.path is not None and own and given:
         remedy = f"leave it out: {file} gives each pair its own"
         yield Wrong("wear.evolution.friction_coefficient", None, remedy)
-    elif file and given == (friction is not None) and not own:
+    elif study.scene.source.path is not None and given == (friction is not None) and not own:
         remedy = f"leave it out: {file} gives each pair its own" if given else f"missing: give it, or {file}"
         yield Wrong("scene.friction_coefficient", friction, remedy)
     if study.wear.surfaces is not None:
