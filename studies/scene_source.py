@@ -18,6 +18,7 @@ from studies.scene import (
     ContactStiffness,
     ExpectedWear,
     Progress,
+    Scene,
     SurfaceMesh,
     Table,
     as_scene,
@@ -34,7 +35,8 @@ Check = tuple[list[tuple[str, str]], Callable[[Path], None]]
 class SceneSource(ABC):
     """A source of scenes, whatever their parameters.
 
-    model: name or path, as the study has it. folder: relative paths start here.
+    model: name or path, as the study has it. folder: relative paths start here. held: file that holds the reduced
+    model, a scene file or a result, and its group there; None where the model is built from parameters.
 
     Functions that take parameters, an object of the class `parameters`, or read files raise SceneError where these are
     wrong, and OSError where a file cannot be read.
@@ -42,37 +44,30 @@ class SceneSource(ABC):
 
     model: str
     folder: Path
+    held: tuple[Path, str] | None = None
 
-    @property
-    def is_bundled(self) -> bool:
-        """Whether the program builds it from the parameters alone."""
-        return False
+    is_bundled: ClassVar[bool] = False
+    """Whether the program builds it from the parameters alone."""
 
     @property
     @abstractmethod
     def parameters(self) -> type[BaseModel]:
         """What [scene] consists of beside `model`; has `friction_coefficient`."""
 
-    @abstractmethod
-    def build(self, parameters: BaseModel, least: int, n_harmonics: int, progress: Progress) -> ReducedModel:
-        """Reduced model, with the nodal diameters that the harmonics 0..n_harmonics see; of a file those that it holds,
-        which are at least those of the harmonics 0..least.
-        """
-
     @property
     def path(self) -> Path | None:
         """The file that holds the reduced model."""
-        return None
+        return None if self.held is None else self.held[0]
 
     @property
     def files(self) -> tuple[Path, ...]:
         """All files that are read."""
-        return () if self.path is None else (self.path,)
+        return () if self.held is None else (self.held[0],)
 
-    @property
+    @cached_property
     def offers(self) -> tuple[str, ...]:
         """What a study may ask for beside what all scenes have: "mesh", "exact"."""
-        return ()
+        return () if self.held is None or _read_mesh(*self.held) is None else ("mesh",)
 
     @property
     def usual(self) -> Mapping[str, float]:
@@ -90,25 +85,50 @@ class SceneSource(ABC):
             del given["friction_coefficient"]
         return given
 
-    def describe(self, parameters: BaseModel) -> dict[str, str]:
-        """Attributes of a scene or result file, see `studies.scene_file.DESCRIPTION`."""
-        return {}
-
     def key(self, parameters: BaseModel) -> tuple[object, ...]:
         """All that the reduced model depends on, contents of files included, beside its harmonics."""
         content = None if self.path is None else file_digest(self.path)
         return self.model, self.of_model(parameters), self.describe(parameters), content
 
+    def build(self, parameters: BaseModel, least: int, n_harmonics: int, progress: Progress) -> ReducedModel:
+        """Reduced model, with the nodal diameters that the harmonics 0..n_harmonics see; of a file those that it holds,
+        which are at least those of the harmonics 0..least.
+        """
+        if self.held is None:
+            return self._build(parameters, n_harmonics, progress)
+        from studies.scene_file import read_scene
+
+        return read_scene(self.held[0], least, self.held[1])
+
+    def describe(self, parameters: BaseModel) -> dict[str, str]:
+        """Attributes of a scene or result file, see `studies.scene_file.DESCRIPTION`."""
+        if self.held is None:
+            return self._describe(parameters)
+        from studies.scene_file import read_description
+
+        return read_description(self.held[0])
+
     def mesh(self, parameters: BaseModel) -> SurfaceMesh | None:
         """Outer faces, None of a source that does not offer them."""
-        return None
+        if "mesh" not in self.offers:
+            return None
+        return self._mesh(parameters) if self.held is None else _read_mesh(*self.held)
+
+    def _build(self, parameters: BaseModel, n_harmonics: int, progress: Progress) -> ReducedModel:
+        raise NotImplementedError
+
+    def _describe(self, parameters: BaseModel) -> dict[str, str]:
+        raise NotImplementedError
+
+    def _mesh(self, parameters: BaseModel) -> SurfaceMesh:
+        raise NotImplementedError
 
     def natural_frequencies(self, parameters: BaseModel, model: ReducedModel) -> dict[int, FloatArray]:
         """Of its model, as `stuck_frequencies`, for all nodal diameters that are known."""
         return stuck_frequencies(model)
 
     def with_room_for_wear(self, parameters: BaseModel, expected: ExpectedWear) -> BaseModel:
-        """Parameters with room for what a study wears, where it is built with such."""
+        """Parameters with room for what a study wears, where a model is built with such."""
         return parameters
 
     def remarks(self) -> tuple[tuple[str, str], ...]:
@@ -120,21 +140,25 @@ class SceneSource(ABC):
         return None
 
 
+def _read_mesh(path: Path, group: str) -> SurfaceMesh | None:
+    from studies.scene_file import read_mesh
+
+    return read_mesh(path, group)
+
+
 @dataclass(frozen=True)
 class Bundled(SceneSource):
     """A bundled scene."""
 
-    @property
-    def is_bundled(self) -> bool:
-        return True
+    is_bundled = True
 
     @property
-    def parameters(self) -> type[BaseModel]:
+    def parameters(self) -> type[Scene]:
         return scene_parameters(self.model)
 
-    @property
+    @cached_property
     def offers(self) -> tuple[str, ...]:
-        return scene_parameters(self.model).OFFERS
+        return self.parameters.OFFERS
 
     @property
     def usual(self) -> Mapping[str, float]:
@@ -142,24 +166,24 @@ class Bundled(SceneSource):
         return {name: value for name, value in defaults.items() if isinstance(value, float) and value > 0.0}
 
     def of_model(self, parameters: BaseModel) -> dict[str, Any]:
-        if as_scene(parameters).FRICTION_IN_MODEL:
-            return parameters.model_dump(mode="json")
-        return super().of_model(parameters)
+        in_model = self.parameters.FRICTION_IN_MODEL
+        return parameters.model_dump(mode="json") if in_model else super().of_model(parameters)
 
-    def describe(self, parameters: BaseModel) -> dict[str, str]:
-        return dict(as_scene(parameters).DESCRIPTION)
-
-    def build(self, parameters: BaseModel, least: int, n_harmonics: int, progress: Progress) -> ReducedModel:
+    def _build(self, parameters: BaseModel, n_harmonics: int, progress: Progress) -> ReducedModel:
         return build_scene(self.model, parameters, n_harmonics)
 
-    def mesh(self, parameters: BaseModel) -> SurfaceMesh | None:
-        return as_scene(parameters).describe_mesh() if "mesh" in self.offers else None
+    def _describe(self, parameters: BaseModel) -> dict[str, str]:
+        return dict(self.parameters.DESCRIPTION)
+
+    def _mesh(self, parameters: BaseModel) -> SurfaceMesh:
+        return as_scene(parameters).describe_mesh()
 
     def natural_frequencies(self, parameters: BaseModel, model: ReducedModel) -> dict[int, FloatArray]:
         return as_scene(parameters).natural_frequencies(model)
 
     def with_room_for_wear(self, parameters: BaseModel, expected: ExpectedWear) -> BaseModel:
-        return as_scene(parameters).with_room_for_wear(expected)
+        # what a result holds was built with the parameters that stand beside it
+        return parameters if self.held else as_scene(parameters).with_room_for_wear(expected)
 
 
 class SceneFileParameters(Table):
@@ -171,98 +195,24 @@ class SceneFileParameters(Table):
     contact_stiffness: ContactStiffness = None
 
 
-class _InFile(SceneSource):
-    """A reduced model in a file."""
-
-    @property
-    @abstractmethod
-    def path(self) -> Path: ...
-
-    @property
-    def group(self) -> str:
-        """Where it stands in a file that holds more."""
-        return ""
-
-    @cached_property
-    def offers(self) -> tuple[str, ...]:
-        return ("mesh",) if self._read_mesh() is not None else ()
-
-    def mesh(self, parameters: BaseModel) -> SurfaceMesh | None:
-        return self._read_mesh() if "mesh" in self.offers else None
-
-    def _read_mesh(self) -> SurfaceMesh | None:
-        from studies.scene_file import read_mesh
-
-        return read_mesh(self.path, self.group)
-
-    def describe(self, parameters: BaseModel) -> dict[str, str]:
-        from studies.scene_file import read_description
-
-        return read_description(self.path)
-
-    def build(self, parameters: BaseModel, least: int, n_harmonics: int, progress: Progress) -> ReducedModel:
-        from studies.scene_file import read_scene
-
-        return read_scene(self.path, least, self.group)
-
-
 @dataclass(frozen=True)
-class SceneFile(_InFile):
-    """A scene file."""
+class SceneFile(SceneSource):
+    """A scene file, or in its place a result, which always hold the model."""
 
     @property
     def parameters(self) -> type[SceneFileParameters]:
         return SceneFileParameters
 
-    @property
-    def path(self) -> Path:
-        return self.folder / self.model
-
     def found(self, parameters: BaseModel) -> SceneSource:
-        check_there(self.path)
+        for path in self.files:
+            check_there(path)
         return self
 
     def build(self, parameters: BaseModel, least: int, n_harmonics: int, progress: Progress) -> ReducedModel:
         model = super().build(parameters, least, n_harmonics, progress)
-        return make_compliant(model, dict(parameters)["contact_stiffness"])
-
-
-@dataclass(frozen=True)
-class InResult(_InFile):
-    """A scene that a result holds, as it was computed with. of: its source. place: file of the result, and group."""
-
-    of: SceneSource
-    place: tuple[Path, str]
-
-    @property
-    def path(self) -> Path:
-        return self.place[0]
-
-    @property
-    def group(self) -> str:
-        return self.place[1]
-
-    @property
-    def parameters(self) -> type[BaseModel]:
-        return self.of.parameters
-
-    @property
-    def is_bundled(self) -> bool:
-        return self.of.is_bundled
-
-    @cached_property
-    def offers(self) -> tuple[str, ...]:
-        return self.of.offers if self.is_bundled else super().offers
-
-    @property
-    def usual(self) -> Mapping[str, float]:
-        return self.of.usual
-
-    def of_model(self, parameters: BaseModel) -> dict[str, Any]:
-        return self.of.of_model(parameters)
-
-    def natural_frequencies(self, parameters: BaseModel, model: ReducedModel) -> dict[int, FloatArray]:
-        return self.of.natural_frequencies(parameters, model)
+        # a result holds what was computed with
+        is_result = self.held is not None and self.held[1]
+        return model if is_result else make_compliant(model, dict(parameters)["contact_stiffness"])
 
 
 @dataclass(frozen=True)
@@ -284,38 +234,42 @@ class FiniteElements(SceneSource):
 
     @property
     def files(self) -> tuple[Path, ...]:
-        return self._files.all
+        return super().files if self.held else self._files.all
 
-    @property
+    @cached_property
     def offers(self) -> tuple[str, ...]:
-        return ("mesh",) if self._files.has_faces else ()
+        return super().offers if self.held else ("mesh",) * self._files.has_faces
 
     def found(self, parameters: BaseModel) -> SceneSource:
+        if self.held:
+            return self
         from studies.fe_models.from_files.model import checked, find_files
 
         return replace(self, found_files=find_files(self.folder, self.model, checked(parameters)))
 
-    def describe(self, parameters: BaseModel) -> dict[str, str]:
-        from studies.fe_models.from_files.model import describe_origin
-
-        return describe_origin(self._files, parameters)
-
-    def build(self, parameters: BaseModel, least: int, n_harmonics: int, progress: Progress) -> ReducedModel:
+    def _build(self, parameters: BaseModel, n_harmonics: int, progress: Progress) -> ReducedModel:
         from studies.fe_models.from_files.model import build
 
         return build(self._files, parameters, n_harmonics, progress)
 
-    def mesh(self, parameters: BaseModel) -> SurfaceMesh | None:
+    def _describe(self, parameters: BaseModel) -> dict[str, str]:
+        from studies.fe_models.from_files.model import describe_origin
+
+        return describe_origin(self._files, parameters)
+
+    def _mesh(self, parameters: BaseModel) -> SurfaceMesh:
         from studies.fe_models.from_files.model import describe_model_mesh
 
-        return describe_model_mesh(self._files, parameters) if "mesh" in self.offers else None
+        return describe_model_mesh(self._files, parameters)
 
     def remarks(self) -> tuple[tuple[str, str], ...]:
         from studies.fe_models.meshes import read_mesh_file
 
-        return read_mesh_file(self._files.mesh).remarks
+        return () if self.held else read_mesh_file(self._files.mesh).remarks
 
     def check(self, parameters: BaseModel, n_harmonics: int, progress: Progress) -> Check | None:
+        if self.held:
+            return None
         from studies.fe_models.from_files.check import describe_model, draw_pairs
         from studies.fe_models.from_files.model import checked, load_model, reduce_model
 
@@ -338,4 +292,4 @@ def source_of(model: str, folder: Path, *, in_result: bool = False) -> SceneSour
         return Bundled(model, folder)
     if not in_result:
         check_there(folder / model)
-    return FiniteElements(model, folder) if is_deck else SceneFile(model, folder)
+    return FiniteElements(model, folder) if is_deck else SceneFile(model, folder, (folder / model, ""))

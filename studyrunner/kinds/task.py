@@ -163,7 +163,7 @@ class Work(NamedTuple):
     longest: float
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, slots=True)
 class Task(ABC):
     """A task, which gives one result or several, one after the other, each at a place of its own.
 

@@ -12,7 +12,6 @@ from pydantic import BaseModel
 
 from solver.settings import FOLLOWED, Followed, FollowedFrequency
 from studies.hdf5 import is_hdf5
-from studies.scene_source import InResult
 from studyrunner.coordinates import COORDINATES, SCENE
 from studyrunner.kinds.table import KINDS
 from studyrunner.kinds.wear.kind import FOLLOWED_FREQUENCY, OF_EVOLUTION
@@ -125,8 +124,7 @@ def _scene_of_result(table: Mapping[str, object], source: str, path: Path, desig
     axes = scene_axes.take_axes(tables, found.parameters, source, design)
     given = next(scene_axes.variants_of(tables, axes, design))["scene"]
     parameters = check_tables({"scene": found.parameters}, {"scene": given}, source)["scene"]
-    held = InResult(found.model, found.folder, found, (path, SCENE_GROUP))
-    return SceneSection(model=found.model, parameters=parameters, source=held)
+    return SceneSection(model=found.model, parameters=parameters, source=replace(found, held=(path, SCENE_GROUP)))
 
 
 def _check_study(table: Mapping[str, object], origin: Origin, design: Design | None) -> Study:

@@ -57,7 +57,7 @@ def test_a_model_is_built_once(case, monkeypatch):
     again = unpack_model(first.model)
     assert bits(again) == bits(model)
     assert type(again.contact.surface) is type(model.contact.surface)
-    monkeypatch.setattr(type(study.scene.source), "build", pytest.fail)
+    monkeypatch.setattr(type(study.scene.source), "_build", pytest.fail)
     second = build(study, first.model)
     assert second.model is None
     assert second.facts.digest == first.facts.digest == describe_scene(model).digest
@@ -210,7 +210,7 @@ KEEP = options("outputs.scene=true")
 def not_built(monkeypatch):
     """From when it is called on, bundled scenes cannot be built."""
 
-    return lambda: monkeypatch.setattr(Bundled, "build", pytest.fail)
+    return lambda: monkeypatch.setattr(Bundled, "_build", pytest.fail)
 
 
 def groups(path):

@@ -56,7 +56,7 @@ class PlannedBlock:
         return Block(model, self.frequency, self.excitation_amplitude, None, cycles, self.begin, self.name)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, slots=True)
 class Mission(tasks.Task):
     """A mission history: blocks of vibration, one after the other, many times. It has one result.
 
