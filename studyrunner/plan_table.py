@@ -39,13 +39,12 @@ def print_table(study: Study, say: Progress, file: TextIO) -> None:
         values = each.values.astype(bool) if each.values.dtype == np.int8 else each.values
         shape = [size if name in each.dimensions else 1 for name, size in points.dims.items()]
         columns[each.name] = np.broadcast_to(values.reshape(shape), tuple(points.dims.values())).ravel().tolist()
-    others = [name for name in columns if name not in keys]
-    header = HEADER[: 6 if plan.sweeps else 4]
+    names, others = ([name for name in columns if (name in keys) == wanted] for wanted in (True, False))
     writer = csv.writer(file, lineterminator="\n")
-    writer.writerow([*(keys[name] for name in columns if name in keys), *header, *others])
-    for row, about in enumerate(of_task):
-        given = (columns[name][row] for name in columns if name in keys)
-        writer.writerow((*given, *about, *(columns[name][row] for name in others)))
+    writer.writerow([*(keys[name] for name in names), *HEADER[: 6 if plan.sweeps else 4], *others])
+    rows = zip(*(columns[name] for name in (*names, *others)), of_task, strict=True)
+    n = len(names)
+    writer.writerows((*values[:n], *about, *values[n:]) for *values, about in rows)
     file.flush()
 
 

@@ -63,7 +63,7 @@ def build_study_scene(study: Study, progress: Progress = silent, known: ReducedM
     least = max(study.given_harmonics, default=1)
     with scene_errors(study.source, source.path), np.errstate(all="ignore"):
         try:
-            model = known or source.build(own, least, harmonics_to_build(study), progress)
+            model = source.build(own, least, harmonics_to_build(study), progress) if known is None else known
         except SceneError as error:
             key, value, default = farthest_from_default(study)
             if key in ("", error.key):
@@ -97,9 +97,13 @@ def harmonics_to_build(study: Study) -> int:
 
 
 def model_key(study: Study) -> str:
-    """Hash under which the model of a scene is stored: of its parameters and files, and of the source of the scenes."""
+    """Hash under which the model of a scene is stored: of its parameters and files, and of the source of the scenes.
+
+    Raises UserError where a file cannot be read.
+    """
     sources = [package_digest(package) for package in ("studies", "solver")]
-    own = *study.scene.source.key(study.scene.parameters), harmonics_to_build(study)
+    with scene_errors(study.source, study.scene.source.path):
+        own = *study.scene.source.key(study.scene.parameters), harmonics_to_build(study)
     return hashlib.sha256(json.dumps((sources, own), sort_keys=True).encode()).hexdigest()[:32]
 
 
