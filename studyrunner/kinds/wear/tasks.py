@@ -38,6 +38,8 @@ _ADAPTIVE_STEPS = 40  # of a history
 _STEPS_TO_THE_END = 100  # of a history until nothing wears any more, with growing steps (20 pairs: 50 to 110)
 
 
+_AT_ONCE = 4096  # groups of points: a million Python numbers take 30 MB
+
 # ways to share histories: with equal values most start states have the same, others one of their own
 _MOST_KNOWN = 1000
 
@@ -184,7 +186,9 @@ def _find_starts(study: Study, points: Points, n_displacements: Sequence[int]) -
 
     def groups() -> Iterator[_Group]:
         rows = sweep, start - begins[sweep], law[bounds], bounds, np.append(bounds[1:], len(order))
-        for number, position, of_law, begin, end in zip(*(each.tolist() for each in rows), strict=True):
+        parts = (slice(first, first + _AT_ONCE) for first in range(0, len(bounds), _AT_ONCE))
+        of_parts = (zip(*(each[part].tolist() for each in rows), strict=True) for part in parts)
+        for number, position, of_law, begin, end in itertools.chain.from_iterable(of_parts):
             own_values = tuple([known[place] for place in values[begin:end].tolist()])
             yield _Group(number, position, laws[of_law][0], numbers[begin:end], own_values)
 
