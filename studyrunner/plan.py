@@ -9,7 +9,6 @@ from typing import NamedTuple
 from solver.contact.wear_law import WearTable
 from studyrunner.kinds.estimate import AUTOMATIC_HARMONICS, COMPILE_SECONDS, largest_memory, memory_a_rank
 from studyrunner.kinds.task import TaskPlan, Work, with_tasks
-from studyrunner.scene.answers import remarks_of_study
 from studyrunner.scene.scene import SceneFacts, farthest_from_default, values_of_point
 from studyrunner.scene.scene_set import SceneSet, merge_facts, plan_scenes
 from studyrunner.study.sections import AUTO, SOLVER_AXES
@@ -75,7 +74,7 @@ def plan_lines(study: Study, say: Callable[[str], None]) -> list[str]:
     rows = [
         *_of_study(study, facts, plan, effort),
         *_of_effort(study, largest, plan, effort, built_with, seconds),
-        *remarks_of_study(study),
+        *study.scene.source.remarks(),
         *(("note", doubt) for doubt in doubts_of_study(study, largest)),
     ]
     return [f"{label:<10} {' '.join(show_text(text).split())}" for label, text in rows]

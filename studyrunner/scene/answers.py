@@ -180,11 +180,6 @@ def _changed(study: Study) -> frozenset[str]:
     return frozenset(changed)
 
 
-def remarks_of_study(study: Study) -> tuple[tuple[str, str], ...]:
-    """Label and text of each line on what was skipped in files, or read in one of two ways."""
-    return study.scene.source.remarks()
-
-
 def check_study_model(study: Study, picture: Path, progress: Progress) -> str:
     """Lines on the finite-element model of a study, for `--check`. picture: of the contact pairs, is written.
 
