@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from pydantic.fields import FieldInfo
 
 from solver.compliant_contact import LARGEST_CONTACT_STIFFNESS, with_contact_stiffness
+from solver.compliant_contact import LARGEST_FRICTION as LARGEST_FRICTION
 from solver.model import FloatArray, IntArray, ReducedModel
 from studies.scene_error import SceneError
 
