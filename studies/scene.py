@@ -1,7 +1,7 @@
 """What a scene is: its parameters, its reduced model, and what it can tell beside the model."""
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Annotated, ClassVar, Self, get_args
 
@@ -10,6 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from pydantic.fields import FieldInfo
 
 from solver.compliant_contact import LARGEST_CONTACT_STIFFNESS, with_contact_stiffness
+from solver.compliant_contact import LARGEST_FRICTION as LARGEST_FRICTION
 from solver.model import FloatArray, IntArray, ReducedModel
 from studies.scene_error import SceneError
 
@@ -135,11 +136,13 @@ class Scene(Table):
     """Parameters of a bundled scene, and what follows from them. Units are metadata of the keys.
 
     FRICTION_IN_MODEL: whether the reduced model depends on the friction coefficient. OFFERS: what a study may ask for
-    among `outputs.variables` that not every scene knows: "mesh", "exact" (a method `exact_answer`).
+    among `outputs.variables` that not every scene knows: "mesh", "exact" (a method `exact_answer`). DESCRIPTION: of the
+    contact for pictures, see `scene_file.DESCRIPTION`.
     """
 
     FRICTION_IN_MODEL: ClassVar[bool] = False
     OFFERS: ClassVar[tuple[str, ...]] = ()
+    DESCRIPTION: ClassVar[Mapping[str, str]] = {}
 
     friction_coefficient: float = Field(0.5, ge=0, description="Coulomb friction coefficient")
     contact_stiffness: ContactStiffness = None

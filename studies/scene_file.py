@@ -46,16 +46,21 @@ MESH = ("x", "y", "z", "quad", "part")
 ATTRIBUTES = ("n_sectors", "nodal_diameter")
 PAIRS_ARE_ROWS = ("rows", "pairs")
 """Name and value of an attribute of the dataset `contact/dofs` that is not transposed."""
-ORIGIN = ("model_files", "model_units", "model_reduced_by")
-"""Attributes of a file whose scene was reduced here from a finite-element model."""
+DESCRIPTION = (
+    *("model_files", "model_units", "model_reduced_by"),
+    *("contact_directions", "contact_origin", "contact_mirrored"),
+)
+"""Attributes of a file, texts. Of a model that was reduced here from finite elements: its files. For pictures: what the
+directions of the tangents are called, as "axial, up the flank"; where they begin; and the axes along which the contact
+is symmetric about the origin, where the pairs are those of one side."""
 
 
 def write_scene(
-    model: ReducedModel, path: str | Path, mesh: SurfaceMesh | None = None, origin: Mapping[str, str] | None = None
+    model: ReducedModel, path: str | Path, mesh: SurfaceMesh | None = None, description: Mapping[str, str] | None = None
 ) -> None:
     """Write a model as a scene file, complete or not at all; an existing file is replaced.
 
-    origin: texts on where the model comes from, attributes of the file. Reading it gives the same model bit by bit.
+    description: attributes of the file, see `DESCRIPTION`. Reading it gives the same model bit by bit.
     Raises SceneError where the model is impossible, OSError where the file cannot be written.
     """
     check_model(model)
@@ -63,7 +68,7 @@ def write_scene(
     unfinished = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
         with h5py.File(unfinished, "w") as file:
-            file.attrs.update({**scene_attributes(model), **(origin or {})})
+            file.attrs.update({**scene_attributes(model), **(description or {})})
             for key, values in scene_datasets(model, mesh):
                 kind = h5py.string_dtype("utf-8") if values.dtype.kind == "U" else values.dtype
                 file.create_dataset(key, data=values.astype(object) if values.dtype.kind == "U" else values, dtype=kind)
@@ -115,10 +120,10 @@ def read_mesh(path: str | Path, group: str = "") -> SurfaceMesh | None:
         return SurfaceMesh(np.stack(axes, axis=1), quads, parts)
 
 
-def read_origin(path: str | Path) -> dict[str, str]:
-    """Attributes of a scene or result file on the model that its scene was reduced from. Raises as `read_scene`."""
+def read_description(path: str | Path) -> dict[str, str]:
+    """Attributes of a scene or result file, those of `DESCRIPTION` that it has. Raises as `read_scene`."""
     with open_hdf5(Path(path)) as file:
-        return {name: text for name in ORIGIN if (text := read_text_attribute(file, name))}
+        return {name: text for name in DESCRIPTION if (text := read_text_attribute(file, name))}
 
 
 @contextmanager

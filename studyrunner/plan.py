@@ -1,6 +1,5 @@
 """The tasks of a study, whatever its kind, what `--plan` says of them, and questions about values that are far off."""
 
-import itertools
 import math
 import time
 from collections import Counter
@@ -10,7 +9,6 @@ from typing import NamedTuple
 from solver.contact.wear_law import WearTable
 from studyrunner.kinds.estimate import AUTOMATIC_HARMONICS, COMPILE_SECONDS, largest_memory, memory_a_rank
 from studyrunner.kinds.task import TaskPlan, Work, with_tasks
-from studyrunner.scene.answers import remarks_of_study
 from studyrunner.scene.scene import SceneFacts, farthest_from_default, values_of_point
 from studyrunner.scene.scene_set import SceneSet, merge_facts, plan_scenes
 from studyrunner.study.sections import AUTO, SOLVER_AXES
@@ -72,11 +70,11 @@ def plan_lines(study: Study, say: Callable[[str], None]) -> list[str]:
     built_with = largest_memory() - before
     plan, largest = build_tasks(study, scenes, facts), merge_facts(facts)
     seconds = time.process_time() + seconds_left
-    effort = effort_of(study, itertools.chain((sweep.work for sweep in plan.sweeps), plan.works))
+    effort = effort_of(study, plan.works)
     rows = [
         *_of_study(study, facts, plan, effort),
         *_of_effort(study, largest, plan, effort, built_with, seconds),
-        *remarks_of_study(study),
+        *study.scene.source.remarks(),
         *(("note", doubt) for doubt in doubts_of_study(study, largest)),
     ]
     return [f"{label:<10} {' '.join(show_text(text).split())}" for label, text in rows]
@@ -205,7 +203,7 @@ def _frequencies(study: Study, parts: Sequence[Study]) -> list[float]:
     """Frequencies of the excitation that the study gives in Hz."""
     if not study.kind.counted or study.axes.frequency_ratio:
         return []
-    own = [value for part in parts if not (study.mission and part.mission) for value in part.axes.frequency]
+    own = [value for part in parts if not part.block_studies for value in part.axes.frequency]
     return own + [end for block in study.mission if block.passage for end in (block.passage.start, block.passage.stop)]
 
 

@@ -12,7 +12,7 @@ from studyrunner.plan import build_tasks, doubts_of_study, effort_of
 from studyrunner.result.arrays import small_arrays
 from studyrunner.result.provenance import compare_with_archived, describe_run
 from studyrunner.result.target import Target, identity_of
-from studyrunner.scene.answers import remarks_of_study
+from studyrunner.scene.answers import description_of
 from studyrunner.scene.scene import SceneFacts
 from studyrunner.scene.scene_set import merge_facts
 from studyrunner.scene_building import Scenes, build_scenes
@@ -47,7 +47,7 @@ def compute_study(
     remove_leftovers(target.path)
     scenes = build_scenes(ranks, study, store, display.step)
     facts = merge_facts(scenes.facts)
-    attributes = {**describe_run(study, facts), **({} if scenes.stored is None else scenes.stored.origin)}
+    attributes = describe_run(study, facts) | description_of(study)
     attributes |= {} if date is None else {"date_created": date}
     plan = build_tasks(study, scenes.scenes, scenes.facts)
     completion = CompletionIndex(study, plan, facts, [each.digest for each in scenes.facts], store)
@@ -101,4 +101,4 @@ def _notes(ranks: Ranks, study: Study, scenes: Scenes, store: Store, facts: Scen
         yield f"one process, although the job has room for {announced}: srun or mpiexec starts them"
     yield from (f"{show_text(study.source)}: {text}" for text in compare_with_archived(study, facts.digest))
     yield from (*store.notes, *scenes.notes, *doubts_of_study(study, facts))
-    yield from (f"{label}: {text}" for label, text in remarks_of_study(study))
+    yield from (f"{label}: {text}" for label, text in study.scene.source.remarks())

@@ -42,6 +42,7 @@ class Parameters(PressedBody):
     """
 
     NAME: ClassVar = "cylinder"
+    DESCRIPTION: ClassVar = {"contact_mirrored": "x"}
     SCAR: ClassVar = (3, 1.5)
     worn_depth: ClassVar = staticmethod(line_worn_depth)
 

@@ -14,7 +14,7 @@ turns about +z), then extrados; from the leading to the trailing edge; from the 
 from collections.abc import Iterator
 from dataclasses import replace
 from math import asin, atan2, cos, hypot, pi, radians, sin, sqrt, tan
-from typing import Annotated
+from typing import Annotated, ClassVar
 
 import numpy as np
 from pydantic import Field
@@ -34,6 +34,11 @@ class Parameters(SectorParameters):
 
     Radii of the dovetail and of the blade are measured along the centre line.
     """
+
+    DESCRIPTION: ClassVar = {
+        "contact_directions": "axial, up the flank",
+        "contact_origin": "Axial 0 is the leading edge, up the flank 0 the inner end",
+    }
 
     friction_coefficient: float = Field(0.5, ge=0, description="Coulomb friction coefficient of the flanks")
     rotation_speed: Rpm = Field(3000.0, gt=0, description="speed of rotation, which presses the flanks together")

@@ -42,6 +42,7 @@ class Parameters(PressedBody):
     """
 
     NAME: ClassVar = "sphere"
+    DESCRIPTION: ClassVar = {"contact_mirrored": "x, y"}
     SCAR: ClassVar = (4, 4.0 / np.pi)
     worn_depth: ClassVar = staticmethod(point_worn_depth)
 

@@ -9,7 +9,7 @@ from pathlib import Path
 
 _AT_FIRST = 560  # to the first state of a sweep (dovetail 270, deck `blade_root` with up to 13 harmonics 1180)
 _OF_RAMP = 180  # to the only state of a ramp (1 and 48 pairs: 221 and 146)
-_A_STATE = 50  # each further frequency of a sweep (slider 70, dovetail 65, 130 to 260 at a wall, 3 where nothing slips)
+A_STATE = 50  # each further frequency of a sweep (slider 70, dovetail 65, 130 to 260 at a wall, 3 where nothing slips)
 
 AUTOMATIC_HARMONICS = 5
 """Harmonics of a state on average where their number is automatic: 1 where nothing slips, 13 in the worst case."""
@@ -33,7 +33,7 @@ def seconds_of(n_unknowns: int, iterations: float) -> float:
 
 def iterations_of_sweep(sweep: str, n_frequencies: int) -> int:
     """Newton iterations of a sweep through so many frequencies, or of a ramp."""
-    return (_OF_RAMP if sweep == "ramp" else _AT_FIRST) + _A_STATE * (n_frequencies - 1)
+    return (_OF_RAMP if sweep == "ramp" else _AT_FIRST) + A_STATE * (n_frequencies - 1)
 
 
 def memory_a_rank(n_unknowns: int, result_values: int, automatic: bool, built_with: float) -> float:

@@ -1,10 +1,11 @@
 """What a kind of study is: all that differs between kinds, as values, and the files of its folder with functions."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import import_module
 from typing import Any
 
+from studyrunner.values import Wrong
 from studyrunner.variables import Variable
 
 
@@ -20,6 +21,7 @@ class Kind:
     - numbers: axes that hold numbers of the joint and of its excitation, which may scatter.
     - no_columns: axes that no column of a design gives.
     - reads: keys that it reads of tables which not every kind reads as a whole. why: another one is to be left out.
+    - rules: what it asks of the tables of a study; those of a kind with a table of its own are in its file "rules".
     - asked, always, more: variables that `outputs.variables` may name, that every result holds, and that other keys ask
       for; in the order of the file. usual, of_samples: those where the study names none, and where samples are drawn.
     - scene: what `outputs.variables` may ask of the scene, names of `coordinates.SCENE`.
@@ -41,6 +43,7 @@ class Kind:
     no_columns: tuple[str, ...] = ()
     reads: Mapping[str, tuple[str, ...]]
     why: str = ""
+    rules: Callable[[Any], Iterator[Wrong]] | None = None
     asked: Mapping[str, Variable]
     always: Mapping[str, Variable]
     more: Mapping[str, Variable] = field(default_factory=dict)
@@ -77,10 +80,15 @@ class Kind:
         axes = (*self.axes, *self.last_axes, *self.other_axes)
         return key in {**self.reads, "axes": axes}.get(table, (key,))
 
+    def broken_rules(self, study: Any) -> Iterator[Wrong]:
+        """What is wrong in a study whose tables are right by themselves."""
+        found: Iterator[Wrong] = (self.rules or self.part("rules").broken_rules)(study)
+        return found
+
     def part(self, name: str) -> Any:
         """A file of its folder, loaded where it is used: studies are read without tasks, and results without studies.
 
-        - "rules": `broken_rules(study)`, of a kind with a table `TABLE`, its class, `read_table` and `complete`;
+        - "rules", of a kind with a table: `broken_rules(study)`, `TABLE`, its class, `read_table` and `complete`;
         - "tasks": `build_tasks(study, points, n_displacements)`, `plan_rows(study)`, and `WAYS`, what n tasks with m
           results do, in words;
         - "findings": `what_came_out(result, stuck)`, `errors_of(result, wore)`;

@@ -163,7 +163,7 @@ class Work(NamedTuple):
     longest: float
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, slots=True)
 class Task(ABC):
     """A task, which gives one result or several, one after the other, each at a place of its own.
 
@@ -279,16 +279,21 @@ def digest(*values: object) -> str:
 class TaskPlan:
     """All tasks of a study.
 
-    make: the tasks that give the results of points; histories wait for a start state. works: what they take. sweeps:
-    the tasks that give start states. left_out: numbers of points that are not computed alone, by reason. n_points: of
-    the study.
+    make: the tasks that give the results of points; histories wait for a start state. make_sweeps: those that give
+    start states. works: what all of them take. left_out: numbers of points that are not computed alone, by reason.
+    n_points: of the study.
     """
 
     make: Callable[[], Iterator[Task]]
     works: Sequence[Work]
     left_out: Mapping[str, int]
     n_points: int
-    sweeps: tuple[Task, ...] = ()
+    make_sweeps: Callable[[], Iterator[Task]] = lambda: iter(())
+
+    @cached_property
+    def sweeps(self) -> tuple[Task, ...]:
+        """The tasks that give start states."""
+        return tuple(self.make_sweeps())
 
     @cached_property
     def results(self) -> tuple[Task, ...]:
@@ -302,7 +307,10 @@ class TaskPlan:
             names = task.hashes(identity)
             return replace(task, names=names, key=digest("task", names))
 
-        return replace(self, sweeps=tuple(map(with_names, self.sweeps)), make=lambda: map(with_names, self.make()))
+        of_sweeps, of_results = self.make_sweeps, self.make
+        return replace(
+            self, make_sweeps=lambda: map(with_names, of_sweeps()), make=lambda: map(with_names, of_results())
+        )
 
     @cached_property
     def waiting(self) -> Mapping[tuple[int, int] | None, Sequence[Task]]:
@@ -334,9 +342,7 @@ def with_tasks(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts]) -> P
     """
     points, limit = scenes.points, math.inf if study.solver.time_limit is None else study.solver.time_limit
     parts = zip(points.studies, scenes.of_blocks, contact_changes(study, scenes, facts), strict=True)
-    joints = [
-        tuple(map(joint_of, own.block_studies or (own,), numbers, of_blocks)) for own, numbers, of_blocks in parts
-    ]
+    joints = [tuple(map(joint_of, own.parts, numbers, of_blocks)) for own, numbers, of_blocks in parts]
 
     def settings(*values: Any) -> SolverSettings:
         return SolverSettings(**dict(zip(SOLVER_AXES, values, strict=True)), time_limit=limit)

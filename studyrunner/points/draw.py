@@ -1,7 +1,6 @@
 """What the samples of a study draw of its inputs, and the study of each sample."""
 
 from collections.abc import Iterator, Mapping
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -35,17 +34,9 @@ def draw_inputs(
         raise UserError(study.source, error.key or "scatter", error.value, error.remedy) from None
 
 
-def block_of_input(study: Study, name: str) -> Any | None:
-    """The block of a mission for which the values of an input are shown: the first one where each has a value of its
-    own; None where the values are around that of the study.
-    """
-    return study.mission[0] if study.mission and all(block.gives(name) for block in study.mission) else None
-
-
 def _own_value(study: Study, name: str, scattered: Scattered) -> ArrayLike:
     """The study's own value of an input; 1, for any, of an absolute distribution."""
-    if block_of_input(study, name) is not None:
-        return _own_value(study.block_studies[0], name, scattered)
+    study = study.part_of(name)
     if name in study.kind.numbers:
         return np.array(getattr(study.axes, name))[:, None]
     value = {**dict(study.scene.parameters), **study.wear.numbers}.get(name)
@@ -74,8 +65,7 @@ def samples_of(study: Study) -> Iterator[Study]:
             update["scene"] = _with_drawn(study, {name: float(values[name][sample]) for name in of_scene})
         if of_wear:
             update["wear"] = study.wear.with_numbers({name: float(values[name][sample]) for name in of_wear})
-        if blocks:
-            update["block_studies"] = tuple(next(block) for block in blocks)
+        update["block_studies"] = tuple(next(block) for block in blocks)
         part = study.model_copy(update=update)
         # a scene of its own has room for what this sample wears, blocks have equal pairs
         yield with_room_for_wear(part) if blocks or of_scene else part

@@ -166,12 +166,11 @@ def build_page_data(result: Result, limit: float, notes: list[str]) -> dict[str,
     if result.has("cycle_count"):
         notes.append("Each point has cycle counts of its own, see cycle_count: cycle is the number of the output.")
     shown = dict(result.shown)
-    last = result.last_reached(shown) if result.kind.counted else 0
     floats = limit / _CHARACTERS_A_FLOAT if result.kind.counted else math.inf
     arrays, counts = _fit(_arrays(result), floats, notes)
     used = dict.fromkeys([*result.axes, *(str(dim) for array in arrays.values() for dim in array.dims)])
     if result.kind.counted:
-        shown["cycle"] = int(np.abs(counts - last).argmin())
+        shown["cycle"] = int(np.abs(counts - result.last_reached(shown)).argmin())
     outcomes = np.unique(result.dataset["outcome"].values).tolist()
     messages = result.dataset["message"].values.ravel().tolist() if result.has("message") else []
     return {

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from solver.outcome import Outcome
 from studyrunner.coordinates import COORDINATES, OF_SCENE, POINT, SAMPLE
 from studyrunner.kinds.wear.kind import ASKED
-from studyrunner.points.draw import block_of_input
 from studyrunner.points.table import Column, Points
 from studyrunner.scene import scene_set
 from studyrunner.scene.answers import SmallArray
@@ -115,7 +114,7 @@ def _coordinate_entry(study: Study, name: str) -> Variable:
 def _worn_coordinate(study: Study, facts: Sequence[SceneFacts], points: Points) -> Iterator[SmallArray]:
     """Wear depths with which the histories begin; none where the study has several scenes or no worn one."""
     if study.scene.worn is not None and len(facts) == 1:
-        axes = [axis.name for axis in study.scene_axes if axis.key == ("worn",)]
+        axes = [axis.name for axis in study.scene_axes if axis.is_worn]
         names, values = points.along([scene_set.worn_depth(each, facts[0]) for each in points.studies], keep=axes)
         yield _of_scene("worn_depth", names, values)
 
@@ -142,8 +141,7 @@ def sample_coordinates(study: Study, facts: Sequence[SceneFacts], scenes: scene_
 
 def _drawn(study: Study, points: Points, name: str) -> Column:
     """What the samples draw of an input that is the same for all pairs."""
-    in_block = block_of_input(study, name) is not None
-    parts = [each.block_studies[0] if in_block else each for each in points.studies]
+    in_block, parts = study.is_in_blocks(name), [each.part_of(name) for each in points.studies]
     if name in study.kind.numbers:
         axes = [getattr(each.axes, name) for each in parts]
         places = points.columns[name]
@@ -159,8 +157,8 @@ def _sample_coordinate(study: Study, name: str, dimensions: tuple[str, ...], val
         units, meaning = describe_key(type(study.wear), *name.split("_", 1))
     else:
         units, meaning = describe_key(type(study.scene.parameters), name)
-    block, comment = block_of_input(study, name), "By [scatter] of the study."
-    if block is not None:
-        comment += f" In the block {block.name}; in another block around the value of that block."
+    comment = "By [scatter] of the study."
+    if block := study.part_of(name).block:
+        comment += f" In the block {block}; in another block around the value of that block."
     entry = Variable(dimensions, units, f"{meaning}, as the sample draws it", comment=comment)
     return SmallArray(f"sample_{name}", dimensions, np.asarray(values, dtype=np.float64), entry)

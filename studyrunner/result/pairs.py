@@ -24,9 +24,6 @@ Places = NDArray[np.intp]
 Scar = tuple[Floats, Places]
 """Places x (n,), m, ascending, and the pairs (n,) at them, index along `contact`."""
 
-JOINT_WORDS = {"dovetail_sector": ("axial", "up the flank")}
-"""The two directions in a contact surface in words, by the model of the scene: those of its tangents, too."""
-
 OF_PAIRS = (*(name for name, entry in COORDINATES.items() if entry.dimensions == ("contact",)), *SCENE["mesh"])
 """Variables that say where the pairs are."""
 
@@ -34,8 +31,6 @@ _EXISTS = "contact_exists"
 _ALIGNED = 0.05  # of the smallest distance between two pairs: pairs are on a line of the grid if they miss it by less
 _LONE, _SLIM = 1e-3, 0.2  # m; width of a single row of pairs, or this part of its length where that is less
 _STRAIGHT = 0.999
-_MIRRORED = ("cylinder_on_flat", "sphere_on_flat")
-"""Bundled scenes with pairs of one half, x > 0, or one quarter, x > 0 and y > 0, of the contact."""
 
 
 @dataclass(frozen=True)
@@ -225,7 +220,7 @@ def find_flanks(result: Result) -> tuple[Flank, ...]:
     """The contact surfaces of a file, in order of first appearance; a single one where the file has no labels."""
     pairs = contact_pairs(result, result.shown)
     area = np.where(np.isfinite(pairs.area), pairs.area, 1.0)
-    words, flanks = JOINT_WORDS.get(str(result.study.get("scene", {}).get("model"))), []
+    words, flanks = directions_in_words(result), []
     for surface in dict.fromkeys(pairs.surface.tolist()):
         members = np.flatnonzero(pairs.surface == surface)
         flank, position = Flank(surface or "contact", members, area[members]), pairs.position[members]
@@ -246,6 +241,12 @@ def find_flanks(result: Result) -> tuple[Flank, ...]:
             flank = replace(flank, grid=grid, edges=edges, seen=seen, directions=named)
         flanks.append(flank)
     return tuple(flanks)
+
+
+def directions_in_words(result: Result) -> tuple[str, str] | None:
+    """What the two directions in a contact surface, those of its tangents, are called; None where nobody has said."""
+    words = str(result.dataset.attrs.get("contact_directions", "")).split(", ")
+    return (words[0], words[1]) if len(words) == 2 else None
 
 
 def _name(direction: Floats) -> str:
@@ -289,9 +290,12 @@ def _edges(at: Floats, share: Floats, length: float, lone: float) -> Floats:
 
 
 def find_scar(result: Result) -> Scar | None:
-    """The line through the middle of the whole contact of a cylinder or a sphere on a flat; None for other scenes."""
+    """The line along x through the middle of a contact whose pairs are those of one side, x > 0; None of others.
+
+    Of a contact that is symmetric along y as well the pairs are those of a quarter.
+    """
     x, y, _ = contact_pairs(result, result.shown).position.T
-    if result.study.get("scene", {}).get("model") not in _MIRRORED or not np.isfinite([x, y]).all():
+    if "x" not in str(result.dataset.attrs.get("contact_mirrored", "")) or not np.isfinite([x, y]).all():
         return None
     row = np.flatnonzero(y <= y.min() + 0.5 * x.min())
     row = row[np.argsort(x[row], kind="stable")]

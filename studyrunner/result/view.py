@@ -124,7 +124,7 @@ class Result:
     def at(self, name: str, point: Point, cycle: int | slice | list[int] = slice(None)) -> xr.DataArray:
         """A variable of one point, read for this point only. cycle: index, or indices, along `cycle` if it has that."""
         values = self.dataset[name].isel(point, missing_dims="ignore")
-        return values.isel(cycle=cycle) if "cycle" in values.dims and self.kind.counted else values
+        return values.isel(cycle=cycle) if "cycle" in values.dims else values
 
     def over_points(
         self, name: str, reduce: Callable[[NDArray[np.float64]], NDArray[np.float64]]
@@ -257,7 +257,7 @@ class Result:
         if self.has("allowable_amplitude"):
             # the least one is that of all
             measures.append(1.0 / self.of_points("allowable_amplitude"))
-        if self.kind.counted and self.has("worn_volume"):
+        if self.has("worn_volume"):
             measures.append(self.worn)
         if self.kind.counted and self.has("response_amplitude"):
             measures.append(self.of_points("response_amplitude", 0).max(axis=-1))

@@ -2,7 +2,7 @@
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from operator import itemgetter
 from pathlib import Path
 from typing import Any, cast
@@ -11,10 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.model import ReducedModel
-from studies.scene import Progress, as_scene, stuck_frequencies
+from studies.scene import Progress
 from studyrunner.coordinates import COORDINATES, SCENE
 from studyrunner.points.table import points_of
-from studyrunner.scene.scene import build_mesh, build_study_scene, describe_origin, harmonics_to_build
+from studyrunner.scene.scene import build_study_scene, harmonics_to_build
 from studyrunner.scene.scene_set import SceneSet, find_scenes
 from studyrunner.study.mistakes import scene_errors
 from studyrunner.study.study import Study
@@ -50,7 +50,7 @@ def build_scene_variables(study: Study, model: ReducedModel, progress: Progress)
 
 
 def _mesh(study: Study) -> Iterator[SmallArray]:
-    mesh = build_mesh(study)
+    mesh = study.scene.source.mesh(study.scene.parameters)
     assert mesh is not None, "asked of scenes that offer it"
     values: dict[str, NDArray[np.generic]] = {
         **{f"mesh_{axis}": mesh.nodes[:, column] for column, axis in enumerate("xyz")},
@@ -62,9 +62,7 @@ def _mesh(study: Study) -> Iterator[SmallArray]:
 
 
 def _frequencies(study: Study, model: ReducedModel) -> Iterator[SmallArray]:
-    scene = study.scene
-    bundled = scene.is_bundled and as_scene(scene.parameters)
-    found = bundled.natural_frequencies(model) if bundled else stuck_frequencies(model)
+    found = study.scene.source.natural_frequencies(study.scene.parameters, model)
     (entry,) = SCENE["natural_frequency"].values()
     values = np.array(list(found.values()))
     labels = {"nodal_diameter": list(found), "mode": range(1, values.shape[1] + 1)}
@@ -75,25 +73,27 @@ def _frequencies(study: Study, model: ReducedModel) -> Iterator[SmallArray]:
 
 @dataclass(frozen=True)
 class StoredScene:
-    """A scene in a result file: attributes, and datasets with groups, by the names of scene files.
-
-    origin: attributes of the result on the files of a finite-element model.
-    """
+    """A scene in a result file: attributes, and datasets with groups, by the names of scene files."""
 
     attributes: Mapping[str, int]
     datasets: tuple[tuple[str, NDArray[np.generic]], ...]
-    origin: Mapping[str, str] = field(default_factory=dict)
 
 
 def scene_to_store(study: Study, model: ReducedModel) -> StoredScene | None:
     """Contents of a scene file for the result; of a bundled scene only on request, as the parameters give it again."""
-    if study.scene.is_bundled and not study.outputs.scene:
+    source = study.scene.source
+    if source.is_bundled and not study.outputs.scene:
         return None
     from studies.scene_file import scene_attributes, scene_datasets
 
-    with scene_errors(study.source, study.scene.path):
-        datasets = tuple(scene_datasets(model, build_mesh(study)))
-        return StoredScene(scene_attributes(model), datasets, describe_origin(study))
+    with scene_errors(study.source, source.path):
+        return StoredScene(scene_attributes(model), tuple(scene_datasets(model, source.mesh(study.scene.parameters))))
+
+
+def description_of(study: Study) -> dict[str, str]:
+    """Attributes of the result on the scene, see `studies.scene_file.DESCRIPTION`."""
+    with scene_errors(study.source, study.scene.source.path):
+        return study.scene.source.describe(study.scene.parameters)
 
 
 def write_study_scene(study: Study, path: Path, progress: Progress) -> None:
@@ -108,10 +108,11 @@ def write_study_scene(study: Study, path: Path, progress: Progress) -> None:
         found = Verbatim(f"{len(others) + 1} scenes")
         raise UserError(study.source, "scene", found, "give each key one value: a scene file holds one scene")
     model = build_study_scene(first, progress)
-    with scene_errors(study.source, first.scene.path):
-        mesh, origin = build_mesh(first), describe_origin(first)
+    source, parameters = first.scene.source, first.scene.parameters
+    with scene_errors(study.source, source.path):
+        mesh, description = source.mesh(parameters), source.describe(parameters)
     try:
-        write_scene(model, path, mesh, origin)
+        write_scene(model, path, mesh, description)
     except OSError as error:
         remedy = f"give a file that can be written: {error.strerror or error}"
         raise UserError("command line", "--write-scene", str(path), remedy) from None
@@ -179,36 +180,19 @@ def _changed(study: Study) -> frozenset[str]:
     return frozenset(changed)
 
 
-def remarks_of_study(study: Study) -> tuple[tuple[str, str], ...]:
-    """Label and text of each line on what was skipped in files, or read in one of two ways."""
-    if study.scene.files is None:
-        return ()
-    from studies.fe_models.meshes import read_mesh_file
-
-    return read_mesh_file(study.scene.files.mesh).remarks
-
-
 def check_study_model(study: Study, picture: Path, progress: Progress) -> str:
     """Lines on the finite-element model of a study, for `--check`. picture: of the contact pairs, is written.
 
     Raises UserError where the study has no such model, the model is wrong, or the picture cannot be written.
     """
-    files = study.scene.files
-    if files is None:
+    with scene_errors(study.source, None), np.errstate(all="ignore"):
+        checked = study.scene.source.check(study.scene.parameters, harmonics_to_build(study), progress)
+    if checked is None:
         remedy = f"give a study file of a finite-element model, which {study.scene.model} here is not"
         raise UserError("command line", "--check", study.source, remedy)
-    # what reads and reduces it is loaded where there is one
-    from studies.fe_models.from_files.check import describe_model, draw_pairs
-    from studies.fe_models.from_files.model import checked, describe_origin, load_model, reduce_model
-
-    parameters = checked(study.scene.parameters)
-    with scene_errors(study.source, None), np.errstate(all="ignore"):
-        loaded = load_model(files, parameters, progress)
-        scene = reduce_model(loaded, harmonics_to_build(study), progress)
-        rows = describe_model(loaded, scene, progress)
-        rows.insert(0, ("files", describe_origin(files, parameters)["model_files"]))
+    rows, draw_pairs = checked
     try:
-        draw_pairs(loaded, scene, picture)
+        draw_pairs(picture)
     except OSError as error:
         remedy = f"give a folder that can be written to: {error.strerror or error}"
         raise UserError("command line", "--check", str(picture), remedy) from None

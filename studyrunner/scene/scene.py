@@ -13,10 +13,9 @@ from numpy.typing import NDArray
 
 from solver.contact.wear_law import surface_factors
 from solver.model import ContactInterface, ReducedModel
-from studies.fe_models.files import file_digest
-from studies.scene import Progress, SurfaceMesh, as_scene, make_compliant, silent, stuck_frequencies
+from studies.scene import Progress, silent, stuck_frequencies
 from studies.scene_error import SceneError
-from studies.scenes import AUTOMATIC_HARMONICS_OF_A_WAVE, build_scene
+from studies.scenes import AUTOMATIC_HARMONICS_OF_A_WAVE
 from studyrunner.kinds.wear.kind import LOOP_COMPONENTS, LOOP_PHASES, LOOPS
 from studyrunner.study.mistakes import raise_wrong, scene_errors
 from studyrunner.study.study import Study
@@ -60,9 +59,11 @@ def build_study_scene(study: Study, progress: Progress = silent, known: ReducedM
     known: the model from an earlier run. Raises UserError where the parameters or the scene file are wrong, or the
     scene lacks what the study asks for.
     """
-    with scene_errors(study.source, study.scene.path), np.errstate(all="ignore"):
+    source, own = study.scene.source, study.scene.parameters
+    least = max(study.given_harmonics, default=1)
+    with scene_errors(study.source, source.path), np.errstate(all="ignore"):
         try:
-            model = _built(study, progress) if known is None else known
+            model = source.build(own, least, harmonics_to_build(study), progress) if known is None else known
         except SceneError as error:
             key, value, default = farthest_from_default(study)
             if key in ("", error.key):
@@ -77,15 +78,15 @@ def build_study_scene(study: Study, progress: Progress = silent, known: ReducedM
 
 
 def farthest_from_default(study: Study) -> tuple[str, float, float]:
-    """Key, value and default of the number of a bundled scene that is farthest, `_OTHER_UNIT` times at least, from its
-    default; else "", 0, 0.
+    """Key, value and usual value of the number of a scene that is farthest, `_OTHER_UNIT` times at least, from what is
+    usual; else "", 0, 0.
     """
-    fields, distance, found = type(study.scene.parameters).model_fields, math.log(_OTHER_UNIT), ("", 0.0, 0.0)
-    for name, entry in fields.items() if study.scene.is_bundled else ():
-        value, default = getattr(study.scene.parameters, name), entry.default
-        is_number = isinstance(default, float) and isinstance(value, float) and min(default, value) > 0.0
-        if is_number and (far := abs(math.log(value / default))) > distance:
-            distance, found = far, (name, value, default)
+    distance, found = math.log(_OTHER_UNIT), ("", 0.0, 0.0)
+    for name, usual in study.scene.source.usual.items():
+        value = getattr(study.scene.parameters, name)
+        is_number = isinstance(value, float) and value > 0.0
+        if is_number and (far := abs(math.log(value / usual))) > distance:
+            distance, found = far, (name, value, usual)
     return found
 
 
@@ -96,53 +97,25 @@ def harmonics_to_build(study: Study) -> int:
 
 
 def model_key(study: Study) -> str:
-    """Hash under which the model of a scene is stored: of its parameters and files, and of the source of the scenes."""
+    """Hash under which the model of a scene is stored: of its parameters and files, and of the source of the scenes.
+
+    Raises UserError where a file cannot be read.
+    """
     sources = [package_digest(package) for package in ("studies", "solver")]
-    content = None if study.scene.path is None else file_digest(study.scene.path)
-    own = study.scene.model, study.scene.of_model, describe_origin(study), content, harmonics_to_build(study)
+    with scene_errors(study.source, study.scene.source.path):
+        own = *study.scene.source.key(study.scene.parameters), harmonics_to_build(study)
     return hashlib.sha256(json.dumps((sources, own), sort_keys=True).encode()).hexdigest()[:32]
-
-
-def describe_origin(study: Study) -> dict[str, str]:
-    """Attributes on the files of a finite-element model; none for other scenes. Raises OSError, SceneError."""
-    # imported where they are used: most studies have no such model
-    if study.scene.files is not None:
-        from studies.fe_models.from_files.model import describe_origin as describe_files
-
-        return describe_files(study.scene.files, study.scene.parameters)
-    if study.scene.path is None:
-        return {}
-    from studies.scene_file import read_origin
-
-    return read_origin(study.scene.path)
-
-
-def _built(study: Study, progress: Progress) -> ReducedModel:
-    scene = study.scene
-    if scene.files is not None:
-        from studies.fe_models.from_files.model import build
-
-        return build(scene.files, scene.parameters, harmonics_to_build(study), progress)
-    if scene.path is None:
-        return build_scene(scene.model, scene.parameters, harmonics_to_build(study))
-    # h5py is loaded for scene files only: the bundled scenes do without it.
-    from studies.scene_file import read_scene
-
-    model = read_scene(scene.path, max(study.given_harmonics, default=1), scene.group)
-    # a scene in a result file is the one that was computed with
-    return model if scene.group else make_compliant(model, dict(scene.parameters)["contact_stiffness"])
 
 
 def _wrong_beside(study: Study, model: ReducedModel) -> Iterator[Wrong]:
     """What of a study does not fit to the pairs of its scene."""
     contact, friction, loops = model.contact, study.friction_coefficient, study.outputs.loops
     given = contact.friction_coefficient is not None
-    own = "friction_coefficient" in study.evolving
-    if study.scene.path is not None and own and given:
-        remedy = "leave it out: contact/friction_coefficient in the scene file gives each pair its own"
+    own, file = "friction_coefficient" in study.evolving, "contact/friction_coefficient in the scene file"
+    if study.scene.source.path is not None and own and given:
+        remedy = f"leave it out: {file} gives each pair its own"
         yield Wrong("wear.evolution.friction_coefficient", None, remedy)
-    elif study.scene.path is not None and given == (friction is not None) and not own:
-        file = "contact/friction_coefficient in the scene file"
+    elif study.scene.source.path is not None and given == (friction is not None) and not own:
         remedy = f"leave it out: {file} gives each pair its own" if given else f"missing: give it, or {file}"
         yield Wrong("scene.friction_coefficient", friction, remedy)
     if study.wear.surfaces is not None:
@@ -187,22 +160,6 @@ def record_fields(study: Study, facts: SceneFacts) -> list[tuple[str, str, tuple
 def values_of_point(study: Study, facts: SceneFacts) -> int:
     """Number of values in a result."""
     return sum(math.prod(shape) for _, _, shape in record_fields(study, facts))
-
-
-def build_mesh(study: Study) -> SurfaceMesh | None:
-    """Mesh of the study's scene, None where it has none. Raises SceneError."""
-    scene = study.scene
-    if "mesh" not in scene.offers:
-        return None
-    if scene.files is not None:
-        from studies.fe_models.from_files.model import describe_model_mesh
-
-        return describe_model_mesh(scene.files, scene.parameters)
-    if scene.path is None:
-        return as_scene(scene.parameters).describe_mesh()
-    from studies.scene_file import read_mesh
-
-    return read_mesh(scene.path, scene.group)
 
 
 def describe_scene(model: ReducedModel) -> SceneFacts:

@@ -50,11 +50,9 @@ def find_scenes(study: Study) -> SceneSet:
     points, studies, keys = points_of(study), dict[str, Study](), list[list[str]]()
     for own in points.studies:
         keys.append([])
-        for each in own.block_studies or (own,):
-            scene, harmonics = each.scene, harmonics_to_build(each)
-            files = None if scene.files is None else [str(path) for path in scene.files.all]
-            where = None if scene.path is None else str(scene.path), scene.group, files
-            keys[-1].append(json.dumps([scene.model, scene.of_model, where, harmonics], sort_keys=True))
+        for each in own.parts:
+            files = [str(path) for path in each.scene.source.files]
+            keys[-1].append(json.dumps([each.scene.of_model, files, harmonics_to_build(each)], sort_keys=True))
             studies.setdefault(keys[-1][-1], each)
     if study.outputs.scene and len(studies) > 1:
         remedy = f"leave it out: the study has {len(studies)} scenes, and a result keeps one"
@@ -86,9 +84,9 @@ def plan_scenes(study: Study, say: Progress) -> tuple[SceneSet, tuple[SceneFacts
     scenes, built = find_scenes(study), dict[str, SceneFacts]()
     began, facts = time.monotonic(), []
     for number, each in enumerate(scenes.studies):
-        # the blocks of a mission have the same pairs, or are refused
-        is_block = bool(study.mission) and number in scenes.of_blocks[0]
-        sizes = str([value for _, value in each.scene.parameters if is_block or not isinstance(value, float)])
+        # parts of one study have the same pairs, or are refused
+        is_part = len(study.parts) > 1 and number in scenes.of_blocks[0]
+        sizes = str([value for _, value in each.scene.parameters if is_part or not isinstance(value, float)])
         if sizes not in built and len(built) < _MOST_PLANNED:
             say(f"building scene {number + 1} of {len(scenes.studies)}")
             with keys_in_file(study):
@@ -129,16 +127,16 @@ def contact_changes(
     facts: of each scene. Raises UserError where a sample draws a value that is none, or blocks differ in their pairs.
     """
     for numbers in scenes.of_blocks:
-        for block, number in zip(study.mission, numbers, strict=False):
+        for part, number in zip(study.parts, numbers, strict=True):
             if facts[numbers[0]].pairs != facts[number].pairs:
-                remedy = f"give parameters with which it has the contact pairs of {study.mission[0].name}, which wear"
-                raise UserError(study.source, f"mission.{block.name}", None, remedy)
+                remedy = f"give parameters with which it has the contact pairs of {study.parts[0].block}, which wear"
+                raise UserError(study.source, f"mission.{part.block}", None, remedy)
     of_blocks = []
-    for place in range(len(study.mission) or 1):
+    for place in range(len(study.parts)):
         changes: list[ContactChange] = []
         of_pairs = drawn_pairs(study, scenes, facts, place)
         for whole, numbers, drawn in zip(scenes.points.studies, scenes.of_blocks, of_pairs, strict=True):
-            own, scene = whole.block_studies[place] if study.mission else whole, facts[numbers[place]]
+            own, scene = whole.parts[place], facts[numbers[place]]
             if own.scene.worn is not None:
                 # wear opens a pair as a gap does, Eq. (7)
                 drawn = {**drawn, "gap": drawn.get("gap", scene.contact.gap) + worn_depth(own, scene)}
@@ -156,7 +154,7 @@ def drawn_pairs(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts], blo
         return [{}] * len(scenes.points.studies)
     of_studies, found = iter(scenes.of_blocks), []
     for whole in study.variants or (study,):
-        variant = whole.block_studies[block] if study.mission else whole
+        variant = whole.parts[block]
         # scenes of samples mostly have the same pairs, and then the same draws
         drawn: dict[Hashable, _Values] = {}
         for sample in range(study.scatter.n_rows):

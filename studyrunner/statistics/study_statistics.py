@@ -86,11 +86,10 @@ def worn_volume_statistics(
             raise ValueError(f"The result holds no {name} of samples: run a study with [scatter].")
     if not all(0.0 < each < 1.0 for each in (*quantiles, confidence)):
         raise ValueError(f"Give probabilities between 0 and 1, not {tuple(quantiles)} and {confidence}.")
-    if "mission" in dataset.dims:
-        # missions count slow time in place of cycles
-        in_cycles = dataset.drop_dims("block", errors="ignore").rename(mission=CYCLE)
-        counted = worn_volume_statistics(in_cycles, quantiles, confidence, exceed, depth, limits)
-        return counted.rename({CYCLE: "mission"})
+    counted = {*dataset["worn_volume"].dims} - {*dataset["outcome"].dims, CYCLE}
+    for slow in counted:  # in place of cycles, as missions
+        in_cycles = dataset.rename({slow: CYCLE})
+        return worn_volume_statistics(in_cycles, quantiles, confidence, exceed, depth, limits).rename({CYCLE: slow})
     if "cycle_count" in dataset:
         # each point has counts of its own: they share the last one only
         dataset = dataset.isel({CYCLE: [-1]})

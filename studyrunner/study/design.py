@@ -4,7 +4,7 @@ import csv
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,6 +14,9 @@ from numpy.typing import NDArray
 from studyrunner.study.text import result_errors
 from studyrunner.system.progress import count
 from studyrunner.user_error import UserError
+
+TASK = "task"
+"""Column of the table of a plan: it and those behind it say more of the points than the axes before it."""
 
 _WHOLE = 2**53  # from here on, numbers without a fraction may have lost theirs
 _FIRST = 2  # row of a file with the first point, below the header
@@ -142,8 +145,14 @@ def _parse(text: str) -> object:
 def make_design(source: str, headers: Sequence[object], values: Sequence[list[Any]], first: int = 0) -> Design:
     """The design with these columns. headers: keys of [axes], which may have a unit behind them, in [ ].
 
-    Raises UserError where it has no rows, a value is none, or a column or a row comes twice.
+    Of the table of a plan, which has a column `TASK`, only columns before this one are read, and rows that are equal in
+    these, as of samples, are one. Raises UserError where there are no rows, a value is none, or a column or else a row
+    comes twice.
     """
+    is_plan = TASK in headers
+    if is_plan:
+        n_axes = headers.index(TASK)
+        headers, values = headers[:n_axes], values[:n_axes]
     columns: dict[str, DesignColumn] = {}
     design, lengths = Design(source, columns, first), {len(column) for column in values}
     if len(headers) != len(values) or len(lengths) > 1:
@@ -157,7 +166,10 @@ def make_design(source: str, headers: Sequence[object], values: Sequence[list[An
             raise design.error(None, key, None, "give each column an axis of its own")
         columns[name] = _column(design, key, unit.strip().removesuffix("]") if unit else None, column)
     firsts, rows = design.groups(columns)
-    if len(firsts) < design.n:
+    if is_plan:
+        kept = np.sort(firsts)
+        columns |= {name: replace(column, codes=column.codes[kept]) for name, column in columns.items()}
+    elif len(firsts) < design.n:
         again = int(np.flatnonzero(firsts[rows] != np.arange(design.n))[0])
         one = next(iter(columns.values()))
         remedy = f"leave out this row: it is row {firsts[rows[again]] + first} again"

@@ -6,7 +6,7 @@ import numpy as np
 from pydantic import BaseModel
 
 from solver.contact.wear_law import WearTable
-from studies.scene import ExpectedWear, as_scene
+from studies.scene import ExpectedWear
 from studyrunner.study.study import Study
 
 _FAR = 3.1
@@ -22,13 +22,12 @@ def with_room_for_wear(study: Study) -> Study:
     sample has (`samples_of`). Blocks of a mission have room for the wear of all of them, in equal pairs.
     """
     scene, parameters = study.scene, dict(study.scene.parameters)
-    if study.mission:
+    if study.block_studies:
         return study.model_copy(update={"block_studies": _with_room_in_blocks(study)})
     own_scenes = study.scatter is not None and study.scatter.inputs.keys() & parameters.keys()
-    # what a result file holds was built with the parameters that stand beside it
-    if own_scenes or not scene.is_bundled or scene.path is not None:
+    if own_scenes:
         return study
-    return _with_parameters(study, as_scene(scene.parameters).with_room_for_wear(expected_wear(study)))
+    return _with_parameters(study, scene.source.with_room_for_wear(scene.parameters, expected_wear(study)))
 
 
 def _with_parameters(study: Study, parameters: BaseModel) -> Study:

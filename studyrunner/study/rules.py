@@ -19,7 +19,7 @@ def broken_rules(study: Study, first: bool) -> Iterator[Wrong]:
     """All that does not fit together. study: with its axes, without variants, and before it is complete. first: whether
     it is the first of the variants, which have the same axes.
     """
-    of_all = (_keys, study.kind.part("rules").broken_rules, _frequency, _amplitude) if first else ()
+    of_all = (_keys, study.kind.broken_rules, _frequency, _amplitude) if first else ()
     for rule in (*of_all, _outputs, _solver_and_end, _scatter, _evolution):
         yield from rule(study)
 
@@ -80,7 +80,7 @@ def _outputs(study: Study) -> Iterator[Wrong]:
         remedy = ""
         if name not in (DEFAULT, *study.kind.always, *known):
             remedy = f"give {nearest_name(name, known)}, for {study.kind.words}"
-        elif name in ("mesh", "exact") and (name not in study.scene.offers or (name == "exact" and no_exact)):
+        elif name in ("mesh", "exact") and (name not in study.scene.source.offers or (name == "exact" and no_exact)):
             remedy = f"leave it out: the scene {study.scene.model} has none"
             remedy += ", or not with these frequencies, cycle counts and pairs" if name == "exact" else ""
         elif name == "natural_frequency" and "nodal_diameter" in study.dimensions and name in study.scene_variables:

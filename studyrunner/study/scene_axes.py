@@ -37,6 +37,11 @@ class SceneAxis:
     meaning: str
 
     @property
+    def is_worn(self) -> bool:
+        """Whether it is that of the worn states with which histories begin, or whose modes are sought."""
+        return self.key == ("worn",)
+
+    @property
     def dotted(self) -> str:
         """Name of the key in the study file, below its table."""
         return ".".join(self.key)
@@ -92,7 +97,7 @@ def take_axes(
 
 def keys_below_axes(scene_axes: Sequence[SceneAxis]) -> dict[str, str]:
     """For keys of [scene] or [wear] whose values stand under [axes]: the keys there."""
-    return {f"{axis.table}.{axis.key[0]}": f"axes.{axis.key[0]}" for axis in scene_axes if axis.key != ("worn",)}
+    return {f"{axis.table}.{axis.key[0]}": f"axes.{axis.key[0]}" for axis in scene_axes if not axis.is_worn}
 
 
 def _rows_and_others(

@@ -4,17 +4,14 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar
+from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, SerializeAsAny
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, InstanceOf, SerializeAsAny
 
-from studies.fe_models.files import ModelFiles, check_there
-from studies.scene import ContactStiffness, as_scene
-from studies.scene_error import SceneError
-from studies.scenes import scene_parameters
+from studies.scene_source import SceneSource, source_of
 from studyrunner.study.mistakes import check_tables, raise_wrong, scene_errors
-from studyrunner.study.text import SCENE_GROUP, Archived, check_result_file, result_errors
+from studyrunner.study.text import Archived, check_result_file, result_errors
 from studyrunner.system.progress import count as counted
 from studyrunner.user_error import UserError, Verbatim
 from studyrunner.values import Axis, NotNegative, Section, Wrong, listed
@@ -24,26 +21,6 @@ if TYPE_CHECKING:
 
 WORN_AXIS = "worn_cycle"
 """Name of the axis of several worn states."""
-
-
-def _names_model(model: str) -> bool:
-    """Whether the text under `scene.model` names a finite-element model: a deck, a mesh or a table of nodes."""
-    return Path(model).suffix.lower() in (".inp", ".msh", ".cdb", ".csv")
-
-
-def _names_file(model: str) -> bool:
-    """Whether the text under `scene.model` names a scene file: an HDF5 ending, or a path that names no model."""
-    named = "/" in model or "\\" in model or Path(model).suffix.lower() in (".h5", ".hdf5", ".he5")
-    return named and not _names_model(model)
-
-
-class SceneFileParameters(Section):
-    """[scene] of a scene file: the friction coefficient only, if the file has none for each pair."""
-
-    AXES: ClassVar = ("friction_coefficient", "contact_stiffness")
-
-    friction_coefficient: NotNegative | None = Field(None, description="a number, 0 or more")
-    contact_stiffness: ContactStiffness = None
 
 
 def _states(value: object) -> object:
@@ -99,32 +76,18 @@ class SceneSection(Section):
 
     parameters: checked object of the class of the scene, with `friction_coefficient` at least.
     worn: wear that the joint begins with.
-    path, group: file of the scene and its group in this file, which is empty in a scene file; None where it is built.
-    files: files of a finite-element model; None for other scenes.
-    offers: names in `outputs.variables` that this scene knows and not every scene knows.
+    source: where its reduced model comes from.
     """
 
     model: str = Field(description="name of a bundled scene, or path of a scene file or a deck, beside the study file")
     parameters: SerializeAsAny[BaseModel]
     worn: Worn | None = Field(None, description="wear before the history begins")
-    path: Path | None = Field(None, exclude=True)
-    group: str = Field("", exclude=True)
-    files: ModelFiles | None = Field(None, exclude=True)
-    offers: tuple[str, ...] = Field((), exclude=True)
+    source: InstanceOf[SceneSource] = Field(exclude=True)
 
     @property
-    def is_bundled(self) -> bool:
-        """Whether the scene is a bundled one; a result may hold the model that it was built to."""
-        return not (_names_file(self.model) or _names_model(self.model))
-
-    @property
-    def of_model(self) -> dict[str, object]:
-        """Parameters that the reduced model depends on: mostly without one friction coefficient of all pairs."""
-        given: dict[str, object] = self.parameters.model_dump(mode="json")
-        depends = self.is_bundled and as_scene(self.parameters).FRICTION_IN_MODEL
-        if not depends and not isinstance(given["friction_coefficient"], dict):
-            del given["friction_coefficient"]
-        return given
+    def of_model(self) -> dict[str, Any]:
+        """Parameters that the reduced model depends on."""
+        return self.source.of_model(self.parameters)
 
 
 @dataclass(frozen=True)
@@ -141,74 +104,33 @@ class Origin:
     scene: SceneSection | None = None
 
 
-def parameters_of(model: object, source: str, folder: Path | None = None) -> type[BaseModel]:
-    """What [scene] consists of beside `model` and `worn`. Raises UserError where there is no such scene.
-
-    folder: relative paths start here; None where a result holds the scene.
-    """
+def read_source(model: object, source: str, folder: Path, *, in_result: bool) -> SceneSource:
+    """What `model` of [scene] stands for, see `source_of`. Raises UserError where there is no such scene."""
     if not isinstance(model, str):
         raise UserError(source, "scene.model", model, "give a bundled scene or the path of a scene file, in quotes")
-    if _names_model(model):
-        if folder is not None:  # a file that is missing is named before keys that are
-            with scene_errors(source, None):
-                check_there(folder / model)
-        from studies.fe_models.from_files.parameters import Parameters  # where it is used: it takes a while to load
-
-        return Parameters
-    if _names_file(model):
-        return SceneFileParameters
-    try:
-        return scene_parameters(model)
-    except SceneError as error:
-        raise UserError(source, "scene.model", model, error.remedy) from None
+    with scene_errors(source, None):
+        return source_of(model, folder, in_result=in_result)
 
 
-def find_scene(scene: SceneSection, origin: Origin, known: SceneSection | None = None) -> SceneSection:
-    """The scene with its files and what it offers: in the result that is read, in files, or to be built.
+def find_scene(scene: SceneSection, origin: Origin) -> SceneSection:
+    """The scene in the result that is read, where this holds it, else with the files of its source.
 
-    scene: checked. known: of another variant of the study, whose file is not read again. Raises UserError where there
-    is no such file, or the result holds the model of another scene.
+    scene: checked. Raises UserError where a file is missing, or the result holds the model of another scene.
     """
-    model, before = scene.model, origin.scene
-    if scene.is_bundled:
-        scene = scene.model_copy(update={"offers": as_scene(scene.parameters).OFFERS})
-    if before is not None and before.model == model:
+    before, source = origin.scene, scene.source
+    if before is not None and before.model == scene.model:
         ours, theirs = scene.of_model, before.of_model
         changed = [key for key in {**theirs, **ours} if ours.get(key) != theirs.get(key)]
-        if not changed:
-            return _in_file(scene, origin.path, SCENE_GROUP, origin, known)
-        if not scene.is_bundled:
+        if changed and not source.is_bundled:
             remedy = "leave it out: the result holds the reduced scene; to change it run the study file again"
             raise UserError(origin.source, f"scene.{changed[0]}", ours.get(changed[0]), remedy)
-    if scene.is_bundled:
-        return scene
-    if _names_file(model):
-        path = origin.path.parent / model
-        with scene_errors(origin.source, path):
-            exists = path.is_file()
-        if not exists:
-            remedy = "there is no such file: give a path relative to the study file"
-            raise UserError(origin.source, "scene.model", model, remedy)
-        return _in_file(scene, path, "", origin, known)
-    # what reads and reduces it is loaded where there is one
-    from studies.fe_models.from_files.model import find_files
-    from studies.fe_models.from_files.parameters import Parameters
-
-    assert isinstance(scene.parameters, Parameters)
+        source = source if changed else before.source
     with scene_errors(origin.source, None):
-        files = find_files(origin.path.parent, model, scene.parameters)
-    return scene.model_copy(update={"files": files, "offers": ("mesh",) if files.has_faces else ()})
-
-
-def _in_file(scene: SceneSection, path: Path, group: str, origin: Origin, known: SceneSection | None) -> SceneSection:
-    """The scene in a file, once it is known that it can be read at all."""
-    from studies.scene_file import read_mesh
-
-    if known is not None and (known.path, known.group) == (path, group):
-        return scene.model_copy(update={"path": path, "group": group, "offers": known.offers})
-    with scene_errors(origin.source, path):
-        offers = scene.offers or (("mesh",) if read_mesh(path, group) is not None else ())
-    return scene.model_copy(update={"path": path, "group": group, "offers": offers})
+        found = source.found(scene.parameters)
+    with scene_errors(origin.source, found.path):
+        # from here on it is known that a file can be read at all
+        _ = found.offers
+    return scene.model_copy(update={"source": found})
 
 
 class _OfResult(Section):

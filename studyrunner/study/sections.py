@@ -6,10 +6,9 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Final, Literal, cast
 
 from pydantic import AfterValidator, Field
 
-from solver.compliant_contact import LARGEST_FRICTION
 from solver.contact.wear_law import PowerTerms, WearLaw, WearTable
 from solver.settings import TARGETS, Followed
-from studies.scene import Unit
+from studies.scene import LARGEST_FRICTION, Unit
 from studyrunner.scatter import ScatterSection
 from studyrunner.values import Axis, Fraction, Listed, NotNegative, Positive, Section, Whole, Wrong, ascending, once
 

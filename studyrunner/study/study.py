@@ -26,7 +26,7 @@ class Study(Section):
     """A whole study.
 
     - kind: which kind of study this is. tables: what marks it, by name, as `mission`.
-    - block_studies: for each block a study of this block alone.
+    - block_studies: for each block a study of this block alone, whose name is `block`.
     - follow: what the frequency of the excitation follows; None where it is given.
     - allowable: whether the excitation amplitude is sought at which each point just meets its target.
     - source, folder: file of the study as the user named it, and its folder.
@@ -49,6 +49,7 @@ class Study(Section):
     tables: dict[str, Any] = Field({}, description="of its kind alone")
     kind: InstanceOf[Kind] = Field(exclude=True)
     block_studies: tuple["Study", ...] = Field((), exclude=True)
+    block: str = Field("", exclude=True)
     follow: FollowedFrequency | None = Field(None, exclude=True)
     allowable: bool = Field(False, exclude=True)
     source: str = Field(exclude=True)
@@ -65,6 +66,19 @@ class Study(Section):
         return tuple(self.tables.get("mission", ()))
 
     @property
+    def parts(self) -> tuple["Study", ...]:
+        """The studies of its vibrations, one after the other: of its blocks, or itself."""
+        return self.block_studies or (self,)
+
+    def is_in_blocks(self, name: str) -> bool:
+        """Whether it has blocks, each of which gives a value of its own to an axis or a number of the joint."""
+        return bool(self.mission) and all(block.gives(name) for block in self.mission)
+
+    def part_of(self, name: str) -> "Study":
+        """The part whose value of a number is shown: the first block where each has one of its own, else the whole."""
+        return self.block_studies[0] if self.is_in_blocks(name) else self
+
+    @property
     def recorded(self) -> Mapping[str, Variable]:
         """Variables of its points, beside those that every result holds."""
         asked = {name: entry for name, entry in self.kind.asked.items() if name in self.outputs.variables}
@@ -79,10 +93,9 @@ class Study(Section):
     @property
     def files(self) -> tuple[Path, ...]:
         """Files that a run of the study reads."""
-        scene = self.scene
-        worn = scene.worn.result if scene.worn else ""
-        found = [self.folder / Path(self.source).name, *(scene.files.all if scene.files else ())]
-        return (*found, *([scene.path] if scene.path else ()), *([self.folder / worn] if worn else ()))
+        worn = self.scene.worn.result if self.scene.worn else ""
+        own = self.folder / Path(self.source).name
+        return (own, *self.scene.source.files, *([self.folder / worn] if worn else ()))
 
     @property
     def friction_coefficient(self) -> float | None:
@@ -152,7 +165,7 @@ class Study(Section):
     def own_axes(self) -> tuple[str, ...]:
         """Names of the axes that are neither keys of [scene] or [wear] nor samples."""
         # those of which every block of a mission gives a value of its own are none
-        idle = [name for name in self.kind.axes if self.mission and all(block.gives(name) for block in self.mission)]
+        idle = [name for name in self.kind.axes if self.is_in_blocks(name)]
         idle += ["excitation_amplitude"] if self.allowable else []
         several = [key for key in sections.SOLVER_AXES if key in self.solver_axes or len(getattr(self.solver, key)) > 1]
         return (*(name for name in self.kind.axes if name not in idle), *several)

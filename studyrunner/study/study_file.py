@@ -22,9 +22,9 @@ from studyrunner.study.mistakes import check_tables, keys_as_given, nearest_name
 from studyrunner.study.overrides import override, with_design
 from studyrunner.study.room import with_room_for_wear
 from studyrunner.study.rules import broken_rules
-from studyrunner.study.scene_section import WORN_AXIS, Origin, SceneSection, find_scene, parameters_of, read_worn
+from studyrunner.study.scene_section import WORN_AXIS, Origin, SceneSection, find_scene, read_source, read_worn
 from studyrunner.study.study import Study
-from studyrunner.study.text import format_toml, read_archived, read_toml
+from studyrunner.study.text import SCENE_GROUP, format_toml, read_archived, read_toml
 from studyrunner.user_error import UserError, Verbatim
 from studyrunner.values import listed
 
@@ -52,7 +52,7 @@ def read_study(study: str | Path, overrides: Sequence[str] | Mapping[str, object
             columns = cast("Any", table.pop("points", {})).get("columns")
             design = read_archived_design(path, source, columns) if columns else None
             whole = with_design(table, design)
-            scene = _scene_of_result(whole, source, design) if archived.holds_scene else None
+            scene = _scene_of_result(whole, source, path, design) if archived.holds_scene else None
             before = _about_scenes(_tables_of(whole, source))
         else:
             table = read_toml(path, source)
@@ -116,14 +116,15 @@ def _about_scenes(tables: scene_axes.Tables) -> str:
     return json.dumps([scene, keys, tables.get("scatter")], sort_keys=True, default=str)
 
 
-def _scene_of_result(table: Mapping[str, object], source: str, design: Design | None) -> SceneSection:
+def _scene_of_result(table: Mapping[str, object], source: str, path: Path, design: Design | None) -> SceneSection:
     """The scene of the study of a result that keeps its reduced model: one for all values of axes."""
     tables = _tables_of(table, source)
     model, _ = tables["scene"].pop("model", None), tables["scene"].pop("worn", None)
-    kind = parameters_of(model, source)
-    axes = scene_axes.take_axes(tables, kind, source, design)
+    found = read_source(model, source, path.parent, in_result=True)
+    axes = scene_axes.take_axes(tables, found.parameters, source, design)
     given = next(scene_axes.variants_of(tables, axes, design))["scene"]
-    return SceneSection(model=model, parameters=check_tables({"scene": kind}, {"scene": given}, source)["scene"])
+    parameters = check_tables({"scene": found.parameters}, {"scene": given}, source)["scene"]
+    return SceneSection(model=found.model, parameters=parameters, source=replace(found, held=(path, SCENE_GROUP)))
 
 
 def _check_study(table: Mapping[str, object], origin: Origin, design: Design | None) -> Study:
@@ -133,7 +134,8 @@ def _check_study(table: Mapping[str, object], origin: Origin, design: Design | N
     """
     source, tables = origin.source, _tables_of(table, origin.source)
     model, worn = tables["scene"].pop("model", None), tables["scene"].pop("worn", None)
-    parameters = parameters_of(model, source, origin.path.parent if origin.archived is None else None)
+    found = read_source(model, source, origin.path.parent, in_result=origin.archived is not None)
+    parameters = found.parameters
     kind, *others = [each for each in KINDS.values() if each.is_in(tables)] or KINDS.values()
     if kind.marker and others:
         remedy = f"leave it out, or {others[0].marker}: a study is of {kind.words} or of {others[0].words}"
@@ -161,9 +163,8 @@ def _check_study(table: Mapping[str, object], origin: Origin, design: Design | N
         for given in variants:
             checked = check_tables({"scene": parameters, "wear": sections.WearSection}, given, source)
             for state in (None,) if worn is None else worn.states():
-                scene = SceneSection(model=model, parameters=checked["scene"], worn=state)
-                known = studies[0].scene if studies else None
-                own = {"scene": find_scene(scene, origin, known), "wear": checked["wear"]}
+                scene = SceneSection(model=found.model, parameters=checked["scene"], worn=state, source=found)
+                own = {"scene": find_scene(scene, origin), "wear": checked["wear"]}
                 study = Study.model_construct(**{**given_tables, **fixed, **own})
                 raise_wrong(source, broken_rules(study, first=not studies))
                 study = study.model_copy(update={"scene_axes": (), "design": None})
@@ -171,8 +172,8 @@ def _check_study(table: Mapping[str, object], origin: Origin, design: Design | N
                     study = kind.part("rules").complete(study, given["scene"], origin)
                 studies.append(_complete(study))
     study = studies[0]
-    if (found := (*scene_axes.as_checked(axes, study), *worn_axis)) or design is not None:
-        study = study.model_copy(update={"scene_axes": found, "variants": tuple(studies), "design": design})
+    if (all_axes := (*scene_axes.as_checked(axes, study), *worn_axis)) or design is not None:
+        study = study.model_copy(update={"scene_axes": all_axes, "variants": tuple(studies), "design": design})
     return study
 
 
@@ -196,7 +197,7 @@ def _complete(study: Study) -> Study:
         names |= {*(FOLLOWED_FREQUENCY if study.loading is not None else ())}
         names |= {"friction_power"} & {*kind.asked} if study.wear.law == "power" else set()
         names |= {*OF_EVOLUTION} & {*kind.asked} if study.evolving else set()
-        names |= {"mesh"} & {*study.scene.offers}
+        names |= {"mesh"} & {*study.scene.source.offers}
     if study.scatter is not None and study.scatter.given_limits:
         names |= {"worn_volume", "worn_volume_error", "wear_depth_max", "wear_depth_max_error"}
     known = dict.fromkeys((*KINDS["wear"].asked, *SCENE, *kind.asked))
@@ -228,7 +229,7 @@ def format_study(study: Study) -> str:
     if study.allowable:
         axes["excitation_amplitude"] = sections.ALLOWABLE
     for axis in study.scene_axes:
-        if axis.key == ("worn",):
+        if axis.is_worn:
             continue
         given, place = tables[axis.table], {} if axis.name in designed else axes
         for name in axis.key[:-1]:
@@ -270,7 +271,7 @@ def _worn_states(study: Study) -> dict[str, object] | None:
     worn = study.scene.worn
     if worn is None:
         return None
-    counts = [count for axis in study.scene_axes if axis.key == ("worn",) for count in axis.values]
+    counts = [count for axis in study.scene_axes if axis.is_worn for count in axis.values]
     # the axis of worn states is the last one
     variants = study.variants[: len(counts)] if counts else (study,)
     depths = [list(each.scene.worn.depth[0]) for each in variants if each.scene.worn]

@@ -142,7 +142,7 @@ class MemoryIndex:
         # keys as in a file
         self.plan = replace(
             plan,
-            sweeps=tuple(replace(task, key=f"sweep {task.number}") for task in plan.sweeps),
+            make_sweeps=lambda: (replace(task, key=f"sweep {task.number}") for task in plan.make_sweeps()),
             make=[replace(task, key=str(task.number)) for task in plan.results].__iter__,
         )
 

@@ -126,9 +126,8 @@ class FakedBlocks:
         if block.name in self.fails:
             return Failure(self.fails[block.name], "lost")
         slope = np.zeros((rate.size, rate.size)) if case.with_slope else None
-        return BlockResult(
-            cycles * rate, response.astype(complex), 1.5 * response, slope, 1e-3, guide=Guide((), 1.0), iterations=7
-        )  # fmt: skip
+        growth, rest = cycles * rate, {"guide": Guide((), 1.0), "iterations": 7}
+        return BlockResult(growth, 1e9 * growth, response.astype(complex), 1.5 * response, slope, 1e-3, **rest)
 
 
 def load_of(block: Any) -> float:

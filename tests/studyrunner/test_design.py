@@ -14,6 +14,7 @@ from studyrunner.api import run_study
 from studyrunner.cli import main
 from studyrunner.kinds.table import KINDS
 from studyrunner.kinds.task import Identity
+from studyrunner.plan_table import print_table
 from studyrunner.report.cli import main as report
 from studyrunner.result.view import open_for_report
 from studyrunner.scene.scene_set import find_scenes
@@ -22,7 +23,7 @@ from studyrunner.user_error import UserError
 from studyrunner.worn_joint import compute_worn_joint
 from tests.mpi.launching import options
 from tests.studyrunner.fakes import plan_of
-from tests.studyrunner.small_studies import CHEAP, MISSIONS, MODES, same_values
+from tests.studyrunner.small_studies import CHEAP, MISSIONS, MODES, SAMPLES, SLIDER, same_values
 
 AXES = {"frequency": [150.0, 160.0], "friction_coefficient": [0.4, 0.5], "damping": [1.0, 0.0]}
 GRID = [dict(zip(AXES, values, strict=True)) for values in itertools.product(*AXES.values())]
@@ -202,7 +203,32 @@ def test_points_are_printed_before_they_run(folder, capsys):
     ]  # fmt: skip
     assert len(rows) == len({each["task"] for each in rows}) == len({each["scene"] for each in rows}) == 6
     assert all(float(each["seconds"]) > 0.0 and float(each["seconds_of_sweep"]) > 0.0 for each in rows)
+    assert list(rows[0])[-1] == "point"
     assert main(["sdof_slider", "--csv"]) == 2
+
+
+PLANNED = {
+    "axes": (SLIDER, {"axes.normal_load": [9, 10], "axes.harmonics": [5, "auto"], "axes.sweep": ["up", "down"]}),
+    "flags and tables": ("dovetail", {"axes.stress_stiffening": [True, False], "axes.mesh": [1, 2]}),
+    "wear factors": ("cylinder_on_flat", {"axes.surfaces": {"flat": [0.5, 0.6]}, "wear.surfaces": {"cylinder": 0.5}}),
+    "samples": (SAMPLES, {"axes.excitation_amplitude": [9.0, 10.0]}),
+    "missions": (MISSIONS, {}),
+    "modes": (MODES, {"axes.mass": [1.0, 1.1], "axes.sweep": ["up", "down"]}),
+}
+
+
+@pytest.mark.parametrize("case", PLANNED)
+def test_the_points_of_a_plan_are_a_design_of_the_same_tasks(case, folder):
+    source, overrides = PLANNED[case]
+    if "\n" in source:
+        Path("s.toml").write_text(source, encoding="utf-8")
+        source = "s.toml"
+    study = read_study(source, overrides)
+    with Path("points.csv").open("w") as file:
+        print_table(study, lambda _: None, file)
+    again = read_study(source, {key: value for key, value in overrides.items() if "axes" not in key}, "points.csv")
+    assert again.design.n > 1
+    assert sorted(names_of(again)) == sorted(names_of(study))
 
 
 @pytest.mark.slow

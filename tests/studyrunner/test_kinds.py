@@ -16,7 +16,7 @@ from tests.studyrunner.results import as_result, result_of_study
 from tests.studyrunner.small_studies import MISSIONS, MODES, SLIDER
 
 STUDIES = {"wear": SLIDER, "modes": MODES, "missions": MISSIONS}
-PARTS = {"rules": ("broken_rules",), "tasks": ("build_tasks", "WAYS", "plan_rows"), "figures": ("FIGURES",)}
+PARTS = {"tasks": ("build_tasks", "WAYS", "plan_rows"), "figures": ("FIGURES",)}
 PARTS |= {"findings": ("what_came_out", "errors_of")}
 
 
@@ -32,6 +32,7 @@ def test_a_kind_names_what_it_has(kind, tmp_path):
     assert pickle.loads(pickle.dumps(study)).kind is kind
     for part, names in PARTS.items():
         assert all(hasattr(kind.part(part), name) for name in names), part
+    assert list(kind.broken_rules(study)) == []
     assert {*kind.axes, *kind.last_axes, *kind.other_axes} <= SECTIONS["axes"].model_fields.keys() & COORDINATES.keys()
     assert {*kind.usual, *kind.of_samples} <= kind.asked.keys()
     assert {"outcome", "newton_iterations", "run_time", "message"} <= kind.always.keys()

@@ -13,7 +13,8 @@ from solver.model import ContactInterface, needed_nodal_diameters
 from solver.packing import Packed, pack, unpack_model
 from studies import build_scene, read_scene, scene_file
 from studies.fe_models.from_files import model as from_files
-from studies.scene_file import read_mesh, write_scene
+from studies.scene_file import read_description, read_mesh, write_scene
+from studies.scene_source import Bundled
 from studyrunner.cli import main
 from studyrunner.result import provenance
 from studyrunner.scene import scene as scene_room
@@ -56,7 +57,7 @@ def test_a_model_is_built_once(case, monkeypatch):
     again = unpack_model(first.model)
     assert bits(again) == bits(model)
     assert type(again.contact.surface) is type(model.contact.surface)
-    monkeypatch.setattr(scene_room, "_built", pytest.fail)
+    monkeypatch.setattr(type(study.scene.source), "_build", pytest.fail)
     second = build(study, first.model)
     assert second.model is None
     assert second.facts.digest == first.facts.digest == describe_scene(model).digest
@@ -209,10 +210,7 @@ KEEP = options("outputs.scene=true")
 def not_built(monkeypatch):
     """From when it is called on, bundled scenes cannot be built."""
 
-    def refuse(*_):
-        raise AssertionError("built again")
-
-    return lambda: monkeypatch.setattr(scene_room, "build_scene", refuse)
+    return lambda: monkeypatch.setattr(Bundled, "_build", pytest.fail)
 
 
 def groups(path):
@@ -283,12 +281,14 @@ def test_a_sector_keeps_all_nodal_diameters_and_its_mesh(wave, not_built):
     not_built()
     kept = read_study("kept.nc")
     assert describe_scene(build_study_scene(kept)).digest == digest
-    assert "mesh" in kept.scene.offers
+    assert "mesh" in kept.scene.source.offers
     assert kept.scene.parameters == study.scene.parameters
     assert main(["kept.nc", "--write-scene", "root.h5"]) == 0
     assert describe_scene(read_scene("root.h5", 2)).digest == digest
     mesh, again = read_mesh("kept.nc", "scene"), read_mesh("root.h5")
     np.testing.assert_equal(vars(again), vars(mesh))
+    told = Bundled("dovetail_sector", Path()).describe(study.scene.parameters)
+    assert read_description("root.h5") == read_description("kept.nc") == told
     with h5py.File("root.h5") as file:
         assert "mesh/quad" in file
         assert set(file.get("nd", ())) == ({str(number) for number in model.linear} if wave else set())

@@ -8,7 +8,7 @@ from pydantic import AfterValidator, BaseModel, ConfigDict, Field
 from solver.settings import Passage
 from studyrunner.kinds.wear.kind import WEAR
 from studyrunner.study.mistakes import check_tables, keys_as_given, nearest_name, raise_wrong
-from studyrunner.study.scene_section import Origin, SceneSection, find_scene
+from studyrunner.study.scene_section import Origin, find_scene
 from studyrunner.study.sections import IDLE_FREQUENCY, AxesSection, SlowTimeSection
 from studyrunner.study.study import Study
 from studyrunner.user_error import UserError
@@ -159,9 +159,7 @@ def complete(study: Study, given: Mapping[str, Any], origin: Origin) -> Study:
         with keys_as_given({f"scene.{key}": f"mission.{block.name}.{key}" for key in block.parameters}):
             table = {"scene": {**given, **block.parameters}}
             parameters = check_tables({"scene": type(scene.parameters)}, table, source)["scene"]
-            of_block = find_scene(
-                SceneSection(model=scene.model, parameters=parameters, worn=scene.worn), origin, scene
-            )
+            of_block = find_scene(scene.model_copy(update={"parameters": parameters}), origin)
         own = {name: (getattr(block, name),) for name in _OWN_AXES if isinstance(getattr(block, name), float)}
         if block.engine_order is not None:
             speed, key = dict(parameters).get("rotation_speed"), f"mission.{block.name}.engine_order"
@@ -170,6 +168,13 @@ def complete(study: Study, given: Mapping[str, Any], origin: Origin) -> Study:
                 raise UserError(source, key, block.engine_order, remedy)
             own["frequency"] = (block.engine_order * float(speed) / 60.0,)
         axes = study.axes.model_copy(update={"frequency": study.axes.frequency or (IDLE_FREQUENCY,), **own})
-        alone = {"kind": WEAR, "tables": {}, "slow_time": SlowTimeSection(), "scene": of_block, "axes": axes}
+        alone = {
+            "kind": WEAR,
+            "tables": {},
+            "block": block.name,
+            "slow_time": SlowTimeSection(),
+            "scene": of_block,
+            "axes": axes,
+        }
         studies.append(study.model_copy(update=alone))
     return study.model_copy(update={"block_studies": tuple(studies)})

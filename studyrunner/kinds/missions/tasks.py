@@ -56,7 +56,7 @@ class PlannedBlock:
         return Block(model, self.frequency, self.excitation_amplitude, None, cycles, self.begin, self.name)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, slots=True)
 class Mission(tasks.Task):
     """A mission history: blocks of vibration, one after the other, many times. It has one result.
 
@@ -181,11 +181,13 @@ def _values(task: Mission, history: "MissionHistory") -> dict[str, Any]:
     last = history.wear_depth[rows[reached[-1]] if reached.size else 0]
     is_state = np.isfinite(history.worn_volume).any() and np.isfinite(history.response_begin).any()
     of_depth = ("worn_volume", "worn_volume_error", "wear_depth", "wear_depth_error")
+    of_energy = ("dissipated_energy", "dissipated_energy_error")
     whole, target = history.last_mission >= task.missions[-1], ""
     if history.outcome.complete:
         target = describe_target(task.until, history.missions_to_target, "mission", whole=whole)
     own: Mapping[str, object] = {
-        **{name: getattr(history, name)[rows] for name in (*of_depth, "response_error", "response_peak_begin")},
+        **{name: getattr(history, name)[rows] for name in (*of_depth, *of_energy)},
+        **{name: getattr(history, name)[rows] for name in ("response_error", "response_peak_begin")},
         **deepest(history.wear_depth[rows], history.wear_depth_error[rows]),
         **first_harmonic(history.response_end[rows]),
         "wear_rate": np.where(np.isfinite(worn), rate, np.nan),

@@ -1,10 +1,16 @@
 """Nonlinear modes: their variables, and what they read of a study."""
 
+from collections.abc import Iterator
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from studyrunner.kinds.kind import Kind
 from studyrunner.kinds.wear.kind import ASKED, OF_A_HISTORY
+from studyrunner.values import Wrong
 from studyrunner.variables import Variable
+
+if TYPE_CHECKING:
+    from studyrunner.study.study import Study
 
 OF_MODES = {
     "natural_frequency": Variable((), "Hz", "natural frequency of the nonlinear mode"),
@@ -40,6 +46,16 @@ OF_A_MODE_POINT = {
     "message": OF_A_HISTORY["message"],
 }
 
+
+def _broken_rules(study: "Study") -> Iterator[Wrong]:
+    """The amplitude goes up or down; each worn joint has a cycle count."""
+    if "ramp" in study.axes.sweep:
+        yield Wrong("axes.sweep", "ramp", 'give "up" or "down": the modal amplitude is raised or lowered')
+    if study.scene.worn is not None and not any(axis.is_worn for axis in study.scene_axes):
+        remedy = "missing: give the cycle count of each depth, the coordinate of the modes"
+        yield Wrong("scene.worn.cycle", None, remedy)
+
+
 _SWEEP = "up: the modal amplitude is raised from zero; down: raised to a larger one, then lowered."
 MODES = Kind(
     name="modes",
@@ -52,6 +68,7 @@ MODES = Kind(
     no_columns=("mode", "modal_amplitude"),
     reads={"slow_time": (), "wear": (), "outputs": ("variables", "scene")},
     why="leave it out: with axes.modal_amplitude nothing is excited and nothing wears",
+    rules=_broken_rules,
     asked=OF_MODES,
     always=OF_A_MODE_POINT,
     usual=(*OF_MODES,),

@@ -20,7 +20,7 @@ _OF_MODE = 900  # to the first point of a mode; with two more unknowns it takes 
 _A_MODE_POINT = 300  # each further amplitude, with errors (study `modes`: 3300 for 9; 30 where nothing slips)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, slots=True)
 class Mode(tasks.Task):
     """A nonlinear mode; a result at each modal amplitude.
 

@@ -19,7 +19,7 @@ HISTORIES_OF_SEARCH = 8
 """Histories of a search. Dovetail, slider: 5 to 14, of which several do not wear, or end early."""
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, slots=True)
 class AllowableAmplitude(Task):
     """The search of one point, with sweeps of its own: each amplitude has another start state.
 

@@ -48,7 +48,7 @@ class Excitation:
         return f"{frequency:.6g} Hz" if self.follow is None else f"the {self.follow.of}"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Integrated:
     """A history that is integrated, and histories that are read from it with scaled slow time.
 
@@ -79,7 +79,7 @@ class Integrated:
         return (self.wear_coefficients[0], step, scheme, self.unworn, self.largest_depth)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, slots=True)
 class _FromRest(Task):
     """A task with start states: it gives them, or begins from one."""
 
@@ -92,7 +92,7 @@ class _FromRest(Task):
         return digest("start", line, frequency)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, slots=True)
 class Sweep(_FromRest):
     """Start states along the frequency, or that of a ramp at a single frequency; a result at each frequency.
 
@@ -163,7 +163,7 @@ class Sweep(_FromRest):
         return f"{how} to {self.excitation.at(self.frequencies[place])}"
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, slots=True)
 class History(_FromRest):
     """Wear histories from a start state that share an adaptive history, each with those that are read from it.
 
@@ -199,8 +199,8 @@ class History(_FromRest):
 
     @property
     def work(self) -> Work:
-        """Of its histories those that are integrated."""
-        return super().work._replace(n_results=len(self.integrated))
+        """What it takes; of its histories those that are integrated."""
+        return Work(self.way, 1, len(self.integrated), self.n_unknowns, self.cost, self.cost)
 
     @property
     def wear_coefficient(self) -> float:

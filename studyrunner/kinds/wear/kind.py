@@ -1,7 +1,14 @@
 """Wear histories: their variables, and what they read of a study."""
 
+from collections.abc import Iterator
+from typing import TYPE_CHECKING
+
 from studyrunner.kinds.kind import Kind
+from studyrunner.values import Wrong
 from studyrunner.variables import Variable
+
+if TYPE_CHECKING:
+    from studyrunner.study.study import Study
 
 _CYCLE, _PAIRS, _RESPONSES = ("cycle",), ("cycle", "contact"), ("cycle", "response")
 _ANGLE = "Angle of X. The first harmonic is x(t) = Re(X exp(i omega t))."
@@ -157,6 +164,13 @@ OF_A_HISTORY = {
 }
 """Those that every result of wear histories holds."""
 
+
+def _broken_rules(study: "Study") -> Iterator[Wrong]:
+    """The excitation has a frequency."""
+    if not study.axes.model_fields_set & {"frequency", "frequency_ratio"}:
+        yield Wrong("axes.frequency", None, "give either it, in Hz, or frequency_ratio")
+
+
 WEAR = Kind(
     name="wear",
     words="wear histories",
@@ -167,6 +181,7 @@ WEAR = Kind(
     other_axes=("frequency_ratio",),
     numbers=("frequency", "wear_coefficient", "excitation_amplitude"),
     reads={"slow_time": ("cycles", "final_share", "outputs", "until", "largest_depth")},
+    rules=_broken_rules,
     asked=ASKED,
     always=OF_A_HISTORY,
     more=LOOPS | COUNTS | ALLOWED,

@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from solver.contact.wear_law import WearLaw
 from solver.settings import ToTheEnd
-from studyrunner.kinds.estimate import iterations_of_sweep, seconds_of
+from studyrunner.kinds.estimate import A_STATE, iterations_of_sweep, seconds_of
 from studyrunner.kinds.task import EQUAL_POINTS, TaskPlan, Work, n_unknowns_of
 from studyrunner.kinds.wear.allowable import HISTORIES_OF_SEARCH, AllowableAmplitude
 from studyrunner.kinds.wear.histories import Excitation, History, Integrated, Sweep
@@ -37,6 +37,8 @@ _AN_ADAPTIVE_STEP = 10  # with refused steps and the reference solution (36 and 
 _ADAPTIVE_STEPS = 40  # of a history
 _STEPS_TO_THE_END = 100  # of a history until nothing wears any more, with growing steps (20 pairs: 50 to 110)
 
+
+_AT_ONCE = 4096  # groups of points: a million Python numbers take 30 MB
 
 # ways to share histories: with equal values most start states have the same, others one of their own
 _MOST_KNOWN = 1000
@@ -75,14 +77,29 @@ class _Together(NamedTuple):
 class _Group(NamedTuple):
     """Points that begin from one start state with one wear law: their numbers, and what they differ in.
 
-    sweep, position: of the start state.
+    sweep, position: of the start state, number of the sweep and place.
     """
 
-    sweep: Sweep
+    sweep: int
     position: int
     law: WearLaw
     numbers: NDArray[np.intp]
     values: tuple[_Values, ...]
+
+
+class _Starts(NamedTuple):
+    """The start states of a study. There may be as many as points, so that sweeps and groups are made anew each time.
+
+    n: number of sweeps. make: a sweep. costs (n,), s; n_unknowns (n,); works: of the sweeps. groups: the points that
+    begin from their states.
+    """
+
+    n: int
+    make: Callable[[int], Sweep]
+    costs: NDArray[np.float64]
+    n_unknowns: NDArray[np.intp]
+    works: Sequence[Work]
+    groups: Callable[[], Iterator[_Group]]
 
 
 _Sharing = Callable[[tuple[_Values, ...]], tuple[tuple[_Together, ...], Counter[str]]]
@@ -108,87 +125,98 @@ def build_tasks(study: Study, points: Points, n_displacements: Sequence[int]) ->
         "to_the_end": ToTheEnd(len(study.output_counts), study.slow_time.final_share) if study.to_the_end else None,
     }
     sharing: _Sharing = lru_cache(_MOST_KNOWN)(partial(_share_histories, study))
-    sweeps, groups = _find_starts(study, points, n_displacements)
+    starts = _find_starts(study, points, n_displacements)
     if study.allowable:
-        searches = list(_searches(study, groups, outputs))
+        searches = list(_searches(study, starts, outputs))
         works = [search.work for search in searches]
         return TaskPlan(partial(iter, searches), works, {}, points.n)
     causes, n_tasks, n_integrated, n_unknowns, seconds, longest = Counter[str](), 0, 0, 0, 0.0, 0.0
-    for sweep, *_, values in groups():
+    of_sweeps, unknowns = starts.costs.tolist(), starts.n_unknowns.tolist()
+    for sweep, *_, values in starts.groups():
         tasks, shared = sharing(values)
-        causes.update(shared)
-        costs = [seconds_of(sweep.n_unknowns, each.iterations) for each in tasks]
-        n_tasks, n_integrated = n_tasks + len(tasks), n_integrated + sum(len(each.integrated) for each in tasks)
-        n_unknowns, seconds = max(n_unknowns, sweep.n_unknowns), seconds + sum(costs)
-        longest = max(longest, sweep.cost + max(costs))
+        if shared:
+            causes.update(shared)
+        costs = [seconds_of(unknowns[sweep], each.iterations) for each in tasks]
+        n_tasks, n_integrated = n_tasks + len(tasks), n_integrated + sum([len(each.integrated) for each in tasks])
+        n_unknowns, seconds = max(n_unknowns, unknowns[sweep]), seconds + sum(costs)
+        longest = max(longest, of_sweeps[sweep] + max(costs))
     left_out = {reason: causes[cause] for cause, reason in _REASONS.items() if causes[cause]}
     work = Work("history", n_tasks, n_integrated, n_unknowns, seconds, longest)
-    return TaskPlan(partial(_make_histories, groups, sharing, outputs), [work], left_out, points.n, tuple(sweeps))
+    make = partial(_make_histories, starts, sharing, outputs)
+    return TaskPlan(make, [*starts.works, work], left_out, points.n, lambda: map(starts.make, range(starts.n)))
 
 
-def _find_starts(
-    study: Study, points: Points, n_displacements: Sequence[int]
-) -> tuple[list[Sweep], Callable[[], Iterator[_Group]]]:
-    """The sweeps of a study, and the points that begin from their states, made anew each time: there may be many."""
+def _find_starts(study: Study, points: Points, n_displacements: Sequence[int]) -> _Starts:
+    """The start states of a study, and the points that begin from them."""
     columns = points.columns
     own = columns["joint"], points.axis("excitation_amplitude"), points.axis("sweep"), columns["settings"]
-    (case, cases), (line, lines) = points.walked(*own), points.walked(*own, columns["law"])
+    (case, cases), (law, laws) = points.walked(*own), points.walked(columns["law"])
     kind, kinds = points.walked(*map(points.axis, ("wear_coefficient", "step", "scheme")))
     places, frequencies = points.walked(columns["hertz"])
     frequency = np.array(frequencies)[places, 0]
-    order = np.lexsort((line, frequency, case))
-    case, line, frequency = case[order], line[order], frequency[order]
-    bounds, first = _begins(case, frequency, line), _begins(case, frequency)
-    sweeps, of_start = list[Sweep](), list[tuple[Sweep, int]]()
-    for begin, end in itertools.pairwise([*_begins(case[first]).tolist(), len(first)]):
-        (joint,), amplitude, direction, settings = cases[case[first[begin]]]
-        n_unknowns = n_unknowns_of(n_displacements[joint.scene], settings.harmonics)
-        length = 1 if direction == "ramp" else end - begin
-        one, whole = (iterations_of_sweep(direction, number) for number in (1, length))
-        for place in range(begin, end, length):
-            sweep = Sweep(
-                number=len(sweeps),
-                scenes=(joint.scene,),
-                settings=settings,
-                cost=seconds_of(n_unknowns, whole),
-                first_share=one / whole,
-                n_unknowns=n_unknowns,
-                joint=joint,
-                excitation=Excitation(amplitude, direction, study.follow),
-                frequencies=tuple(frequency[first[place : place + length]].tolist()),
-            )
-            sweeps.append(sweep)
-            of_start += [(sweep, position) for position in range(length)]
+    order = np.lexsort((law, frequency, case))
+    case, law, frequency = case[order], law[order], frequency[order]
+    bounds, first = _begins(case, frequency, law), _begins(case, frequency)
+    unknowns = np.array([n_unknowns_of(n_displacements[each[0][0].scene], each[-1].harmonics) for each in cases])
+    is_ramp = np.array([direction == "ramp" for *_, direction, _ in cases])
+    # a ramp gives a single state
+    begins = np.flatnonzero((np.diff(case[first], prepend=-1) != 0) | is_ramp[case[first]])
+    ends, of_case = np.append(begins[1:], len(first)), case[first[begins]]
+    iterations = np.array([iterations_of_sweep(direction, 1) for *_, direction, _ in cases])
+    whole = iterations[of_case] + A_STATE * (ends - begins - 1)
+    costs = whole * np.array([seconds_of(number, 1.0) for number in unknowns.tolist()])[of_case]
+
+    def make(number: int) -> Sweep:
+        own = int(of_case[number])
+        (joint,), amplitude, direction, settings = cases[own]
+        return Sweep(
+            number=number,
+            scenes=(joint.scene,),
+            settings=settings,
+            cost=float(costs[number]),
+            first_share=float(iterations[own] / whole[number]),
+            n_unknowns=int(unknowns[own]),
+            joint=joint,
+            excitation=Excitation(amplitude, direction, study.follow),
+            frequencies=tuple(frequency[first[begins[number] : ends[number]]].tolist()),
+        )
+
     start, numbers, values = np.searchsorted(first, bounds, side="right") - 1, points.numbers[order], kind[order]
-    known = [_Values(*each) for each in kinds]
+    sweep, known = np.searchsorted(begins, start, side="right") - 1, [_Values(*each) for each in kinds]
 
     def groups() -> Iterator[_Group]:
-        ends = np.append(bounds[1:], len(order)).tolist()
-        for at, begin, end in zip(start.tolist(), bounds.tolist(), ends, strict=True):
-            (sweep, position), own = of_start[at], tuple(known[place] for place in values[begin:end].tolist())
-            yield _Group(sweep, position, lines[line[begin]][-1], numbers[begin:end], own)
+        rows = sweep, start - begins[sweep], law[bounds], bounds, np.append(bounds[1:], len(order))
+        parts = (slice(first, first + _AT_ONCE) for first in range(0, len(bounds), _AT_ONCE))
+        of_parts = (zip(*(each[part].tolist() for each in rows), strict=True) for part in parts)
+        for number, position, of_law, begin, end in itertools.chain.from_iterable(of_parts):
+            own_values = tuple([known[place] for place in values[begin:end].tolist()])
+            yield _Group(number, position, laws[of_law][0], numbers[begin:end], own_values)
 
-    return sweeps, groups
+    works, lengths = [], ends - begins
+    for way, wanted in (("sweep", False), ("ramp", True)):
+        if (these := is_ramp[of_case] == wanted).any():
+            most, of_these = unknowns[of_case[these]].max(), costs[these]
+            totals = int(these.sum()), int(lengths[these].sum()), int(most)
+            works.append(Work(way, *totals, float(of_these.sum()), float(of_these.max())))
+    return _Starts(len(begins), make, costs, unknowns[of_case], works, groups)
 
 
-def _make_histories(
-    groups: Callable[[], Iterator[_Group]], sharing: _Sharing, outputs: Mapping[str, Any]
-) -> Iterator[History]:
+def _make_histories(starts: _Starts, sharing: _Sharing, outputs: Mapping[str, Any]) -> Iterator[History]:
     """The histories of a study, in the order of their start states."""
-    number = itertools.count()
-    for group in groups():
+    number, sweep_of = itertools.count(), lru_cache(1)(starts.make)
+    for group in starts.groups():
+        sweep = sweep_of(group.sweep)
         for together in sharing(group.values)[0]:
             own = {
-                "cost": seconds_of(group.sweep.n_unknowns, together.iterations),
+                "cost": seconds_of(sweep.n_unknowns, together.iterations),
                 "indices": tuple(tuple(group.numbers[list(same)].tolist()) for same in together.points),
                 "integrated": together.integrated,
             }
-            yield _history(group, number=next(number), **own, **outputs)
+            yield _history(sweep, group, number=next(number), **own, **outputs)
 
 
-def _history(group: _Group, **own: Any) -> History:
+def _history(sweep: Sweep, group: _Group, **own: Any) -> History:
     """A history from the start state of a group."""
-    sweep = group.sweep
     return History(
         scenes=sweep.scenes,
         settings=sweep.settings,
@@ -203,14 +231,12 @@ def _history(group: _Group, **own: Any) -> History:
     )
 
 
-def _searches(
-    study: Study, groups: Callable[[], Iterator[_Group]], outputs: Mapping[str, Any]
-) -> Iterator[AllowableAmplitude]:
+def _searches(study: Study, starts: _Starts, outputs: Mapping[str, Any]) -> Iterator[AllowableAmplitude]:
     """The searches for allowable amplitudes, one for equal points, each with all histories that it takes."""
     number, depth = itertools.count(), study.slow_time.largest_depth
     outputs = {**outputs, "variables": tuple(name for name in study.recorded if name not in ALLOWED)}
-    for group in groups():
-        sweep, values = group.sweep, group.values
+    for group in starts.groups():
+        sweep, values = starts.make(group.sweep), group.values
         for value in dict.fromkeys(values):
             same = [place for place, each in zip(group.numbers.tolist(), values, strict=True) if each == value]
             largest = depth if value.scheme == "explicit" else None
@@ -218,7 +244,7 @@ def _searches(
             iterations = _iterations([(value.scheme, value.step)], study.output_counts[-1])
             cost = HISTORIES_OF_SEARCH * (sweep.cost * sweep.first_share + seconds_of(sweep.n_unknowns, iterations))
             own = {"cost": cost, "indices": (tuple(same),), "integrated": (integrated,)}
-            yield AllowableAmplitude.of(_history(group, number=next(number), **own, **outputs))
+            yield AllowableAmplitude.of(_history(sweep, group, number=next(number), **own, **outputs))
 
 
 def _share_histories(study: Study, points: Sequence[_Values]) -> tuple[tuple[_Together, ...], Counter[str]]:

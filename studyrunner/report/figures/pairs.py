@@ -19,7 +19,6 @@ from studyrunner.result.view import Result
 from studyrunner.system.progress import count
 from studyrunner.units import Scale, scale_for
 
-_ORIGIN = "Axial 0 is the leading edge, up the flank 0 the inner end"
 _MOST_FLANKS, _SLENDER, _LOW, _LABEL_WIDTH = 3, 0.12, 0.4, 14
 _MOST_SERIES, _MOST_PROFILES = 4, 5
 _MANY_PAIRS, _MOST_NUMBERED, _MOST_NUMBERS, _LONGEST_NAME = 150, 4, 120, 20
@@ -244,5 +243,5 @@ def draw_numbers(result: Result) -> Drawn:
             panel.text(x, y, f"{name:.0f}", ha="center", va="center", fontsize=8, clip_on=False)
         panel.set_title(flank.surface)
     plot.label_outer(panels)
-    origin = _ORIGIN if flanks[0].directions in contact.JOINT_WORDS.values() else ""
+    origin = str(result.dataset.attrs.get("contact_origin", ""))
     return figure, f"As along the dimension contact: {len(names)} pairs", origin

@@ -15,7 +15,7 @@ from studyrunner.report import drawing as plot
 from studyrunner.report.drawing import COLOURS, Drawn, FloatArray
 from studyrunner.report.selection import Course, choose, find_course, labelled
 from studyrunner.result.opening import pairs_with_loops
-from studyrunner.result.pairs import JOINT_WORDS, last_depth
+from studyrunner.result.pairs import directions_in_words, last_depth
 from studyrunner.result.view import NO_MOTION, Point, Result
 from studyrunner.units import scale_for
 
@@ -206,7 +206,7 @@ def _word(result: Result, each: tuple[str, str], rows: list[Any]) -> str:
     what, component = each
     if component not in _TANGENTS:
         return f"{component} {what}".strip()
-    named = JOINT_WORDS.get(str(result.study.get("scene", {}).get("model")), ("tangent 1", "tangent 2"))
+    named = directions_in_words(result) or ("tangent 1", "tangent 2")
     alone = len({tangent for row in rows for _, tangent in row}) == 1
     return f"{what}, {'tangential' if alone else named[_TANGENTS.index(component)]}"
 

@@ -82,25 +82,29 @@ def test_the_root_of_one_scene_is_written(kind, n_files, request, tmp_path):
     assert np.nanmax(mesh.point_data["wear_depth (m)"]) == np.nanmax(expected)
 
 
+def test_directions_have_the_words_of_the_scene(meshes):
+    plain = of_shown_scene(meshes)
+    told = replace(plain, dataset=plain.dataset.assign_attrs(contact_directions="axial, up the flank"))
+    assert {each.directions for each in find_flanks(told)} == {("axial", "up the flank")}
+    assert {each.directions[0] for each in find_flanks(plain)} == {"z"}
+
+
 # --- the scar of a cylinder and of a sphere, and the measured one beside it ---
 
 X = 1e-5 * np.array([1.0, 1.0, 1.0, 3.0, 3.0, 5.0, 5.0, 5.0, 7.0, 7.0, 9.0, 9.0])
 Y = 1e-5 * np.array([1.0, 3.0, 5.0, 1.0, 3.0, 1.0, 3.0, 5.0, 1.0, 3.0, 1.0, 3.0])
 
 
-def half_space(model):
+def half_space(mirrored):
     result = smooth_result()
-    x, y = (np.linspace(0.5, 11.5, 12) * 1e-5, np.zeros(12)) if model == "cylinder_on_flat" else (X, Y)
+    x, y = (np.linspace(0.5, 11.5, 12) * 1e-5, np.zeros(12)) if mirrored == "x" else (X, Y)
     places = {"contact_x": ("contact", x), "contact_y": ("contact", y), "contact_z": ("contact", np.zeros(12))}
-    study = f'[study]\nname = "s"\n[scene]\nmodel = "{model}"\n'
-    return replace(result, dataset=result.dataset.assign_coords(places).assign_attrs(study=study))
+    return replace(result, dataset=result.dataset.assign_coords(places).assign_attrs(contact_mirrored=mirrored))
 
 
-@pytest.mark.parametrize(
-    ("model", "row"), [("cylinder_on_flat", np.arange(12)), ("sphere_on_flat", np.flatnonzero(Y == 1e-5))]
-)
-def test_the_scar_is_symmetric_and_that_of_the_pairs(model, row):
-    result = half_space(model)
+@pytest.mark.parametrize(("mirrored", "row"), [("x", np.arange(12)), ("x, y", np.flatnonzero(Y == 1e-5))])
+def test_the_scar_is_symmetric_and_that_of_the_pairs(mirrored, row):
+    result = half_space(mirrored)
     depth = result.dataset["wear_depth"].isel(result.shown).isel(cycle=-1).values
     panel = draw_figure(result, "worn_profile").figure.axes[0]
     (line,) = [each for each in panel.lines if str(each.get_label()).startswith("after")]
@@ -118,7 +122,7 @@ def test_the_measured_profile_is_drawn_beside_it(tmp_path):
     profile = read_profile(path)
     np.testing.assert_allclose(profile.x, [-2e-5, 2e-5])
     np.testing.assert_allclose(profile.depth, [0.5e-6, 1.5e-6])
-    drawing = draw_figure(replace(half_space("cylinder_on_flat"), measured=profile), "worn_profile")
+    drawing = draw_figure(replace(half_space("x"), measured=profile), "worn_profile")
     (line,) = [each for each in drawing.figure.axes[0].lines if each.get_label() == "measured"]
     assert len(line.get_xdata()) == 2
     assert "scar.csv" in drawing.caption
