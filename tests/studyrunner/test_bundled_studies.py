@@ -141,7 +141,11 @@ def test_every_point_of_the_extremes_is_whole_or_says_why_not():
 
 def test_each_bundled_study_has_a_small_picture_on_the_page_that_lists_them():
     page = (Path(studyrunner.__file__).parent / "FIRST_JOB.md").read_text(encoding="utf-8")
-    own = {"dovetail": "worn_root", **dict.fromkeys(("work_precision", "work_precision_slider"), "error_against_time")}
+    own = {
+        "dovetail": "worn_root",
+        "running_in": "running_in_frequency",
+        **dict.fromkeys(("work_precision", "work_precision_slider"), "error_against_time"),
+    }
     own |= {study: f"study_{study}" for study in GALLERY}
     assert set(own) == set(bundled_studies())
     for study, name in own.items():
