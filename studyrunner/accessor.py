@@ -11,13 +11,16 @@ import numpy as np
 import xarray as xr
 
 from solver.outcome import Outcome
-from studyrunner.result.opening import ENDED, outcome_words
+from studyrunner.coordinates import OF_SCENE
+from studyrunner.result.opening import ENDED, kind_of, outcome_words
 from studyrunner.result.pairs import find_grid
 from studyrunner.statistics.study_statistics import worn_volume_statistics
 from studyrunner.study.text import read_toml
 from studyrunner.summary.answer import Summary, summary
 from studyrunner.user_error import UserError
 
+_SELECTED = ("cycle", "mission", "block", "contact", "response")
+"""Dimensions behind the axes, in their order, that a selection may take off."""
 _PAIRS = ("contact", "contact_x", "contact_y", "contact_z", "contact_surface")
 
 
@@ -26,6 +29,20 @@ def _require(dataset: xr.Dataset, *names: str) -> None:
     if missing := [name for name in names if name not in dataset]:
         remedy = "give a result of a study that asks for it by [outputs] variables"
         raise ValueError(f"The dataset holds no {' and no '.join(missing)}: {remedy}.")
+
+
+def _widened(dataset: xr.Dataset, name: str, variables: Sequence[str]) -> xr.Dataset:
+    """With a dimension again, of length 1, which a selection has taken off variables. Raises ValueError where its value
+    is lost.
+    """
+    needed = [each for each in variables if each in dataset and name not in dataset[each].dims]
+    if not needed:
+        return dataset
+    if name not in dataset.coords:
+        raise ValueError(f"The dataset has lost its {name}: select or squeeze it without drop=True.")
+    value, about = [dataset[name].item()], dataset[name].attrs
+    put = {each: dataset[each].drop_vars(name).expand_dims(name) for each in needed if each != name}
+    return dataset.drop_vars([name, *put]).assign(put).assign_coords({name: (name, value, about)})
 
 
 class FretwearAccessor:
@@ -48,14 +65,18 @@ class FretwearAccessor:
     def summary(self) -> Summary:
         """What came out: where the joint wears most, how much, how deep, how well that is known, what failed.
 
-        `print` shows it as the last lines of a run do, `.values` has the numbers. ValueError: no result of a study,
-        or one without a dimension of its variables.
+        `print` shows it as the last lines of a run do, `.values` has the numbers. Selected and squeezed results have
+        one, too. ValueError: no result of a study, or one that has lost the value of a selected dimension.
         """
-        _require(self._dataset, "outcome", "contact")
-        for name in ("cycle", "mission", "contact", "response"):
-            if name in self._dataset.coords and name not in self._dataset.dims:
-                raise ValueError(f"{name} is no dimension of this dataset: select with a list, as isel({name}=[0])")
-        return summary(self._dataset)
+        _require(self._dataset, "outcome")
+        kind, whole = kind_of(self._dataset), self._dataset
+        named = {**kind.variables, **OF_SCENE}
+        for name in _SELECTED:
+            whole = _widened(whole, name, [each for each, entry in named.items() if name in entry.dimensions])
+        if not whole["outcome"].dims:
+            whole = _widened(whole, kind.axes[0], list(kind.variables))
+        _require(whole, "contact")
+        return summary(whole.transpose(*whole["outcome"].dims, *_SELECTED, ..., missing_dims="ignore"))
 
     @property
     def surfaces(self) -> tuple[str, ...]:

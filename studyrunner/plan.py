@@ -121,7 +121,8 @@ def _of_effort(
     yield from zip(("left out", *[""] * (len(left_out) - 1)), left_out, strict=True)
     whole, longest = effort.seconds, effort.longest
     one, two, most = (format_seconds(prepared_in + each) for each in (whole, max(longest, whole / 2.0), longest))
-    yield "time", f"about {one} on one rank, {two} on two, {most} on many, {study.kind.time}"
+    earlier = ", less where points end at their target" if study.slow_time.until and not study.allowable else ""
+    yield "time", f"about {one} on one rank, {two} on two, {most} on many, {study.kind.time}{earlier}"
     yield "", f"points at which all pairs stick take next to none; a first run compiles for {COMPILE_SECONDS} s more"
     n_values = plan.n_points * values_of_point(study, facts)
     memory = memory_a_rank(effort.n_unknowns, n_values, is_automatic, built_with) / 1e9
@@ -155,6 +156,12 @@ def doubts_of_study(study: Study, facts: SceneFacts | None = None) -> tuple[str,
         _question("slow_time.until.worn_volume", [until.get("worn_volume", 0.0)], volume, "more than joints lose"),
         _question("scatter.limits.wear_depth", [limits.get("wear_depth", 0.0)], depth, deep),
         _question("scatter.limits.worn_volume", [limits.get("worn_volume", 0.0)], volume, "more than joints lose"),
+        _question(
+            "scatter.limits.response_amplitude",
+            [limits.get("response_amplitude", 0.0)],
+            ("m", 0.0, 1.0, lengths),
+            "more than parts vibrate",
+        ),
         _question("slow_time.largest_depth", [study.slow_time.largest_depth or 0.0], depth, deep),
         _question("scene.worn", worn, depth, deep),
         _question("gap", gap, ("m", 0.0, 1.0, lengths), "wider than joints are"),

@@ -136,16 +136,22 @@ class Scattered(Section):
         return next(each for each in (self.normal, self.lognormal, self.uniform) if each is not None)
 
 
-class Limits(Section):
-    """What a design allows, of the values of samples after all cycles and before."""
+LIVES = {"cycles_to_target", "missions_to_target"}
 
-    wear_depth: Positive | None = None
-    worn_volume: Positive | None = None
+
+class Limits(Section):
+    """What a design allows, of the values of samples after all cycles and before, named as variables of the result."""
+
+    wear_depth: Positive | None = Field(None, description="m, at most, of the deepest pair")
+    worn_volume: Positive | None = Field(None, description="m3, at most")
+    response_amplitude: Positive | None = Field(None, description="m, at most, of any response at any count")
+    cycles_to_target: Positive | None = Field(None, description="at least, until slow_time.until")
+    missions_to_target: Positive | None = Field(None, description="at least, until slow_time.until")
 
     def rules(self) -> Iterator[Wrong]:
         """One of them is given."""
         if not self.model_dump(exclude_none=True):
-            yield Wrong("", {}, "give wear_depth, worn_volume or both, or leave it out")
+            yield Wrong("", {}, f"give one or more of {', '.join(type(self).model_fields)}, or leave it out")
 
 
 class ScatterSection(Section):
@@ -162,7 +168,8 @@ class ScatterSection(Section):
     seed: Annotated[Whole, Field(ge=0, lt=2**31)] = Field(1, description="of the random numbers")
     limits: Limits | None = Field(
         None,
-        description="how probable is at most {wear_depth = 5e-6}, m, of the deepest pair, or {worn_volume = 1e-9}, m3",
+        description="how probable is at most {wear_depth = 5e-6}, m, of the deepest pair, {worn_volume = 1e-9}, m3,"
+        " {response_amplitude = 1e-3}, m, or, with slow_time.until, at least {cycles_to_target = 1e6}",
     )
 
     def rules(self) -> Iterator[Wrong]:

@@ -1,5 +1,6 @@
 """The tasks of a study while they are done: by any rank its own, and on rank 0 the state of all of them."""
 
+import time
 from collections import Counter, OrderedDict, defaultdict
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -8,13 +9,14 @@ from solver.model import ReducedModel
 from solver.outcome import Outcome, describe_error, is_machine_fault
 from solver.packing import Packed
 from studyrunner.checkpoint.completion_index import CompletionIndex
-from studyrunner.kinds.task import Keep, PointResult, Result, StartResult, Task
+from studyrunner.kinds.task import Keep, Part, PointResult, Result, StartResult, Task
 from studyrunner.mpi.schedule import Run, TaskHandler
 from studyrunner.scene_building import ModelCache, SceneBuilt, SceneModels, SceneTask, build_scene_task, hold_models
 from studyrunner.system.machine import MappedFile, open_mapped
 from studyrunner.system.process import raise_ending
 from studyrunner.system.progress import ProgressDisplay, Standing
 
+_TOLD = 4.0  # times the share that is done: weight of the time that it tells
 _LATE = 0.3
 """Expected further time of a late task over its time: the mean, for estimates to a factor of two."""
 
@@ -42,7 +44,7 @@ def _compute(task: Task, models: Mapping[int, ReducedModel], keep: Keep) -> Iter
     """All results of a task, failed ones in place of those that it does not give."""
     left, last, is_limited = dict.fromkeys(task.places), task.resume, False
 
-    def keep_last(progress: Packed | str) -> None:
+    def keep_last(progress: Packed | str | Part) -> None:
         nonlocal last
         last = progress if isinstance(progress, Packed) else last
         keep(progress)
@@ -88,6 +90,7 @@ class StudyRun(TaskHandler):
         self.tasks = [*self._sweeps, *(task for task in completion.plan.results if not completion.is_finished(task))]
         self._n_given: Counter[str] = Counter()
         self._words: dict[str, str] = {}  # where a task is
+        self._parts: dict[str, tuple[float, float]] = {}  # share of a task that was done, and when
         self._suspects: list[Task] = []  # they wait for the one that is under way
         self._tried = ""
         self._n_ranks, self._n_left = n_ranks, len(self.tasks)
@@ -127,8 +130,11 @@ class StudyRun(TaskHandler):
         """Takes the progress of a task as `Keep` does."""
         if isinstance(progress, Packed):
             self._completion.keep(task, progress)
-        else:
-            self._words[task.key] = str(progress)
+            return
+        if isinstance(progress, Part):
+            self._parts[task.key] = progress.share, time.monotonic()
+            progress = progress.words
+        self._words[task.key] = str(progress)
 
     def tick(self, running: Callable[[], Sequence[tuple[Task, int, float]]]) -> None:
         """Writes and shows what is due."""
@@ -138,13 +144,19 @@ class StudyRun(TaskHandler):
     def look(self, running: Sequence[tuple[Task, int, float]]) -> Standing:
         """State of the tasks. running: as `Dispatcher.running`."""
         factors = {group: self._factor(group) for group in self._left}
+        known = self._by_their_parts(running, factors)
+        for task, *_ in running:
+            # what similar tasks have taken is worth more
+            if task.key in known and task.group[-1] not in self.costs.sums:
+                factors[task.group] = known[task.key] / sum(task.costs)
         left = sum(max(0.0, seconds) * factors[group] for group, seconds in self._left.items())
         done, longest = sum(self.costs.sums.get(group[-1], (0.0, 0.0, 0))[0] for group in factors), 0.0
         names = []
         for task, n_left, elapsed in running:
-            expected = task.costs[-n_left] * factors[task.group]
-            still = max(expected - elapsed, _LATE * elapsed)
-            left, done, longest = left + still - expected, done + min(elapsed, expected), max(longest, still)
+            planned = task.costs[-n_left] * factors[task.group]
+            expected = known.get(task.key, planned)
+            still = max(expected - elapsed, _LATE * elapsed * (task.key not in known))
+            left, done, longest = left + still - planned, done + min(elapsed, expected), max(longest, still)
             words = f" ({self._words[task.key]})" if self._words.get(task.key) else ""
             names.append(task.describe(task.places[task.n_results - n_left]) + words)
         return Standing(
@@ -154,6 +166,21 @@ class StudyRun(TaskHandler):
             seconds_left=max(longest, left / max(1, min(self._n_ranks, self._n_left))),
             running=tuple(names),
         )
+
+    def _by_their_parts(
+        self, running: Sequence[tuple[Task, int, float]], factors: Mapping[tuple[Hashable, ...], float]
+    ) -> dict[str, float]:
+        """Expected time of running tasks, s, of which is known how much was done at some time, by their keys. factors:
+        of the estimates, which count as long as little is done.
+        """
+        now, found = time.monotonic(), dict[str, float]()
+        for task, _, elapsed in running:
+            share, at = self._parts.get(task.key, (0.0, now))
+            if share > 0.0 and elapsed > now - at:
+                told, planned = (elapsed - now + at) / share, factors[task.group] * sum(task.costs)
+                weight = min(1.0, _TOLD * share)
+                found[task.key] = weight * told + (1.0 - weight) * planned
+        return found
 
     def _factor(self, group: tuple[Hashable, ...]) -> float:
         """Measured over estimated times of a group. In full from half of its work on: cheap results come first."""

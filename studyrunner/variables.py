@@ -1,5 +1,6 @@
 """What a variable of a result file is."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 
@@ -23,3 +24,9 @@ class Variable:
     def is_text(self) -> bool:
         """Whether the values are texts."""
         return self.dtype.startswith(("U", "str"))
+
+
+def in_metres(responses: Iterable[object]) -> list[int]:
+    """Places of the responses, by name, that share a scale: without a unit in the name; all where each has one."""
+    names = list(map(str, responses))
+    return [place for place, name in enumerate(names) if not name.endswith("]")] or list(range(len(names)))

@@ -16,7 +16,6 @@ import numpy as np
 
 from solver.compliant_contact import with_evolution
 from solver.model import ReducedModel, with_friction
-from solver.packing import Keep as Keep
 from solver.packing import Packed, unpack
 from solver.settings import Automatic, SolverSettings
 from studyrunner.kinds.estimate import AUTOMATIC_HARMONICS
@@ -27,6 +26,18 @@ from studyrunner.scene.scene_set import ContactChange, SceneSet, contact_changes
 from studyrunner.study.sections import AUTO, SOLVER_AXES
 from studyrunner.study.study import Study
 from studyrunner.system.machine import MappedFile, package_digest
+
+
+@dataclass(frozen=True)
+class Part:
+    """How much of a task is done, from 0 to 1, and in words."""
+
+    share: float
+    words: str
+
+
+Keep = Callable[[Packed | str | Part], None]
+"""Takes from time to time what another computation needs to go on, and where a computation is."""
 
 EQUAL_POINTS = "all values are those of another point"
 """Reason for a result that points share, whatever the kind of study."""

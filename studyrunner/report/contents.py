@@ -7,7 +7,7 @@ from typing import Any
 from studyrunner.kinds.table import KINDS
 from studyrunner.report import drawing as plot
 from studyrunner.report.drawing import Drawing, Drawn, Item, Missing, Table, as_sentences
-from studyrunner.report.figures import pairs, points, root, wear
+from studyrunner.report.figures import pairs, points, root, samples, wear
 from studyrunner.report.selection import course_axis
 from studyrunner.result.pairs import OF_PAIRS, of_shown_scene
 from studyrunner.result.view import Result
@@ -75,12 +75,13 @@ _QUANTILES = (
     " numerical errors"
 )
 _EXCEEDANCE = (
-    "Probability that more is worn than a volume, and that a pair is worn deeper than a depth. Where two lines are"
-    " alike, samples without a value leave open what is between them"
+    "Probability that more is worn than a volume, and that a pair is worn deeper than a depth; that a response is"
+    " larger, or a life longer, where these have a limit. Where two lines are alike, samples without a value leave open"
+    " what is between them"
 )
 _DECIDING = (
-    "Share of the variance (Sobol' indices), or rank correlation: 1 or -1 where the volume rises or falls with this"
-    " input alone; an effect that rises and falls is not seen"
+    "Share of the variance (Sobol' indices), or rank correlation: 1 or -1 where the volume, or the life, rises or falls"
+    " with this input alone; an effect that rises and falls is not seen"
 )
 _ENDS = f"{_OTHERS}. Bars: estimated errors; of a point that ended early, what was worn by then"
 _CERTIFIED = "The largest over all points computed to the end and all counts in the file; 0 is the best"
@@ -89,13 +90,17 @@ _SECTOR: dict[str, Any] = {"scene": root.OF_SECTOR, "always": True, "needs": ("n
 OF_WEAR = (
     *(
         Entry(
-            f"{name}_bands{end}", f"{of} of the samples over {over}", points.draw_bands, (name, way), caption=_QUANTILES
+            f"{name}_bands{end}",
+            f"{of} of the samples over {over}",
+            samples.draw_bands,
+            (name, way),
+            caption=_QUANTILES,
         )
         for name, of in (("worn_volume", "Worn volume"), ("wear_depth", "Deepest wear"))
         for end, over, way in (("", "{slow}", "cycle"), ("_course", "{over}", "course"))
     ),
-    Entry("exceedance", "Probability of more wear", points.draw_exceedance, caption=_EXCEEDANCE),
-    Entry("deciding_inputs", "What decides the worn volume", points.draw_deciding_inputs, caption=_DECIDING),
+    Entry("exceedance", "Probability of more", samples.draw_exceedance, caption=_EXCEEDANCE),
+    Entry("deciding_inputs", "What decides", samples.draw_deciding_inputs, caption=_DECIDING),
     Entry("worn_volume", "Worn volume over {slow}", wear.draw_history, needs=_WORN, at="course", caption=BANDS),
     Entry("final_worn_volume", "Final worn volume over {over}", wear.draw_final, needs=_WORN, caption=_ENDS),
     Entry("worn_volume_map", "Worn volume over {over} and {slow}", wear.draw_map, "worn_volume", **_MAP),

@@ -25,7 +25,7 @@ from studyrunner.statistics.samples import DRAWN
 from studyrunner.study.text import check_result_file, read_toml
 from studyrunner.user_error import UserError, Verbatim, show_text
 from studyrunner.values import Wrong
-from studyrunner.variables import Variable
+from studyrunner.variables import Variable, in_metres
 
 KIND = "kind"
 """Attribute of a result: name of its kind of study."""
@@ -117,9 +117,8 @@ def as_history(dataset: xr.Dataset) -> tuple[xr.Dataset, xr.Dataset | None]:
     """
     history, blocks = dataset, None
     if "response" in dataset.coords:
-        has_unit = np.char.endswith(dataset["response"].values.astype(str), "]")
-        if has_unit.any() and not has_unit.all():
-            history = history.isel(response=np.flatnonzero(~has_unit))
+        kept = in_metres(dataset["response"].values)
+        history = history if len(kept) == dataset["response"].size else history.isel(response=kept)
     kind = kind_of(dataset)
     if "block" in dataset.dims:
         names = map(str, history.variables)

@@ -109,7 +109,7 @@ class Result:
     @cached_property
     def statistics(self) -> xr.Dataset | None:
         """What the samples of the file say, see `statistics_of_file`; None where it has none."""
-        return statistics_of_file(self.dataset)
+        return statistics_of_file(self.dataset, self.blocks)
 
     def has(self, *names: str) -> bool:
         """Whether the file holds all of these variables."""

@@ -127,13 +127,17 @@ def probability_interval(found: ArrayLike, n: int, confidence: float) -> tuple[A
     return low, np.where(of < n, scipy.stats.beta.ppf(1.0 - tail, of + 1, np.maximum(n - of, 1)), 1.0)
 
 
-def below(values: SampleValues, limit: float, confidence: float) -> tuple[Array, Array, NDArray[np.int_]]:
-    """Probability (..., 2) of values up to a limit, its interval (..., 2), and the number (...) of samples of which
-    value and error, or its bounds, lie on both sides: these count as below and as above.
+def within(
+    values: SampleValues, limit: float, confidence: float, *, at_least: bool = False
+) -> tuple[Array, Array, NDArray[np.int_]]:
+    """Probability (..., 2) of values up to a limit, or from it on, its interval (..., 2), and the number (...) of
+    samples of which value and error, or its bounds, lie on both sides: these count as within and as beyond.
     """
-    own = values.widened()
-    band, interval = (1.0 - each[..., 0, ::-1] for each in exceedance(own, np.array([limit]), confidence))
-    return band, interval, ((own.low <= limit) & (own.high > limit)).sum(axis=-1)
+    own, end = values.widened(), np.nextafter(limit, -np.inf) if at_least else limit
+    band, interval = (each[..., 0, :] for each in exceedance(own, np.array([end]), confidence))
+    if not at_least:
+        band, interval = (1.0 - each[..., ::-1] for each in (band, interval))
+    return band, interval, ((own.low <= end) & (own.high > end)).sum(axis=-1)
 
 
 def rank_correlations(inputs: Array, values: SampleValues, confidence: float) -> tuple[Array, Array]:

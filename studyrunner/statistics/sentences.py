@@ -8,17 +8,21 @@ import xarray as xr
 from studyrunner.scatter import ScatterSection
 from studyrunner.statistics import samples
 from studyrunner.statistics.samples import FEWEST
-from studyrunner.statistics.study_statistics import CONFIDENCE, QUANTILES, QUANTITIES
-from studyrunner.units import show_percent
+from studyrunner.statistics.study_statistics import CONFIDENCE, LIFE, QUANTILES, QUANTITIES
+from studyrunner.units import show_number, show_percent
 
 _MM3 = 1e9
 _MEASURES = ("first_index", "rank_correlation")
 
 
 def describe_volumes(point: xr.Dataset) -> str:
-    """Range, median and numerical error of the worn volumes and depths of one point, and two groups where there are."""
+    """Range, median and numerical error of the worn volumes and depths of one point, and two groups where there are; of
+    the lives where points end at a target.
+    """
     probabilities, n_without = point["quantile"].values, int(point["n_without_value"])
     share = 100.0 * (probabilities[-1] - probabilities[0])
+    if f"{LIFE}_quantile" in point:
+        return f"{share:.4g} % of {int(point['n_samples'])} samples last {_describe_spread(point, LIFE)}"
     text = f"{share:.4g} % of {int(point['n_samples'])} samples wear {_describe_spread(point, 'worn_volume')}"
     text += f"; {n_without} have no volume that can be trusted" if n_without else ""
     text += f"; deepest pair {_describe_spread(point, 'wear_depth')}" if "wear_depth_quantile" in point else ""
@@ -31,13 +35,13 @@ def describe_volumes(point: xr.Dataset) -> str:
 
 
 def _describe_spread(point: xr.Dataset, name: str) -> str:
-    factor, unit = QUANTITIES[name][-2:]
+    factor, unit = QUANTITIES[name].factor, QUANTITIES[name].shown
     ends, error = (point[f"{name}_{each}"].values * factor for each in ("quantile", "quantile_error"))
     text, is_middle = f"{_range(ends[0, 0], ends[-1, 1])} {unit}", point["quantile"].values == 0.5
     for middle, moved in zip(ends[is_middle], error[is_middle], strict=True):
         # how far the ends move, apart from what samples without a value may have
         finite = np.isfinite(middle)
-        by = np.abs(moved - middle)[finite]
+        by = np.abs(moved[finite] - middle[finite])
         relative = float(by.sum() / middle[finite].sum()) if by.any() else 0.0
         shown = show_percent(relative) if finite.any() and math.isfinite(relative) else "not known"
         text += f", median {_range(*middle)} {unit} (numerical error {shown})"
@@ -45,12 +49,14 @@ def _describe_spread(point: xr.Dataset, name: str) -> str:
 
 
 def describe_limit(point: xr.Dataset, name: str) -> str:
-    """Probability of the limit of worn_volume or wear_depth of one point, its interval, and how many samples are known
-    to be below it, and to be on no side.
+    """Probability of the limit of one point, its interval, and how many samples are known to be within it, and to be
+    on no side. name: of `QUANTITIES`.
     """
-    n_samples, (factor, unit) = int(point["n_samples"]), QUANTITIES[name][-2:]
-    ends, interval = (100.0 * point[f"{name}_below_limit{each}"].values for each in ("", "_interval"))
-    text = f"{name.replace('_', ' ')} at most {point[f'{name}_limit'].item() * factor:.4g} {unit}: {_range(*ends)} %"
+    n_samples, quantity = int(point["n_samples"]), QUANTITIES[name]
+    ends, interval = (100.0 * point[f"{name}_within_limit{each}"].values for each in ("", "_interval"))
+    side, words = ("at least", "life") if quantity.at_least else ("at most", name.replace("_", " "))
+    limit = show_number(point[f"{name}_limit"].item() * quantity.factor, 4)
+    text = f"{words} {side} {limit} {quantity.shown}: {_range(*ends)} %"
     text += f" probable ({100.0 * point.attrs['confidence']:g} % interval {_range(*interval)} %),"
     text += f" {round(n_samples * ends[0] / 100.0)} of {n_samples} samples"
     n_unknown = int(point[f"{name}_not_placed"])
@@ -74,8 +80,8 @@ def what_samples_tell(section: ScatterSection) -> str:
     return f"{n} by {section.method}: {', '.join(texts)}; {known}, or better where nearly all or none are below a limit"
 
 
-def _range(low: float, high: float, digits: str = ".3g") -> str:
-    first, last = f"{low:{digits}}", f"{high:{digits}}"
+def _range(low: float, high: float, digits: str = "") -> str:
+    first, last = (f"{each:{digits}}" if digits else show_number(each, 3) for each in (low, high))
     return f"above {first}" if math.isinf(high) else first if first == last else f"{first} to {last}"
 
 

@@ -13,6 +13,7 @@ from studyrunner.coordinates import SAMPLE
 from studyrunner.scatter import ScatterSection
 from studyrunner.statistics import samples
 from studyrunner.statistics.samples import CYCLE, DRAWN, Array, SampleValues
+from studyrunner.variables import in_metres
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)  # of the bands that figures show
 CONFIDENCE = 0.95
@@ -26,19 +27,31 @@ _Arrays = dict[str, tuple[tuple[str, ...], Any, dict[str, str]]]
 
 
 class _Quantity(NamedTuple):
-    """What samples are asked about. variables: of a result that hold it. factor, shown: unit for a reader."""
+    """What samples are asked about. variables: of a result that hold it. exceeded: dimension of what is exceeded.
+
+    factor, shown: unit for a reader. at_least: whether a limit is the least that is allowed.
+    """
 
     words: str
     units: str
     variables: tuple[str, ...]
+    exceeded: str
     factor: float
     shown: str
+    at_least: bool = False
 
 
+LIFE = "cycles_to_target"
+RESPONSE = "response_amplitude"
 QUANTITIES = {
-    "worn_volume": _Quantity("worn volume", "m3", ("worn_volume",), 1e9, "mm3"),
-    "wear_depth": _Quantity("wear depth of the deepest pair", "m", ("wear_depth", "wear_depth_max"), 1e6, "um"),
+    "worn_volume": _Quantity("worn volume", "m3", ("worn_volume",), "exceeded_volume", 1e9, "mm3"),
+    "wear_depth": _Quantity(
+        "wear depth of the deepest pair", "m", ("wear_depth", "wear_depth_max"), "exceeded_depth", 1e6, "um"
+    ),
+    RESPONSE: _Quantity("largest amplitude of any response so far", "m", (RESPONSE,), "exceeded_amplitude", 1e3, "mm"),
+    LIFE: _Quantity("life", "cycles", (LIFE,), "exceeded_life", 1.0, "cycles", at_least=True),
 }
+"""The response only where it has a limit, the life where points end at a target."""
 
 
 @dataclass(frozen=True)
@@ -67,16 +80,18 @@ def worn_volume_statistics(
 
     dataset: with the dimension `sample`, drawn values as coordinates `sample_NAME`, and `worn_volume`. quantiles:
     probabilities, ascending. confidence: of the intervals. exceed, depth: worn volumes, m3, and depths, m, for the
-    probabilities of exceedance; by default 41 up to the largest. limits: of worn_volume, m3, and wear_depth, m, above
-    0; by default those of the study.
+    probabilities of exceedance; by default 41 up to the largest. limits: of worn_volume, m3, wear_depth, m,
+    response_amplitude, m, and cycles_to_target or missions_to_target, above 0; by default those of the study.
 
     Returns worn_volume_quantile (m3), worn_volume_exceedance, and of each input first_index and total_index (1) with
     saltelli, else rank_correlation (1), each with _interval; worn_volume_quantile_error (m3), the ends with every value
-    less or more its numerical error. With a limit: worn_volume_limit (m3); worn_volume_below_limit, the probability up
+    less or more its numerical error. With a limit: worn_volume_limit (m3); worn_volume_within_limit, the probability up
     to it, with _interval; worn_volume_not_placed: samples that are not known to be on one side, with numerical errors,
-    which count as above in the lowest and as below in the highest probability. The same of wear_depth (m), of the
-    deepest pair, where the file has it. n_samples, n_without_value; of the last count worn_volume_density (1/m3) over
-    worn_volume_grid (m3), group_size (2), group_gap (m3, two ends; NaN for one group), deciding_contact (-1: none).
+    which count as beyond in the lowest and as within in the highest probability. The same of wear_depth (m), of the
+    deepest pair, where the file has it; with a limit of response_amplitude (m), the largest of all responses up to the
+    count; where points end at a target of cycles_to_target, whose limit is the least, and which inputs then decide.
+    n_samples, n_without_value; of the last count worn_volume_density (1/m3) over worn_volume_grid (m3), group_size (2),
+    group_gap (m3, two ends; NaN for one group), deciding_contact (-1: none).
 
     Raises ValueError where the result has no samples or no worn volume, a probability is not between 0 and 1, or a
     limit is not above 0 or of what the file does not have.
@@ -86,10 +101,12 @@ def worn_volume_statistics(
             raise ValueError(f"The result holds no {name} of samples: run a study with [scatter].")
     if not all(0.0 < each < 1.0 for each in (*quantiles, confidence)):
         raise ValueError(f"Give probabilities between 0 and 1, not {tuple(quantiles)} and {confidence}.")
-    counted = {*dataset["worn_volume"].dims} - {*dataset["outcome"].dims, CYCLE}
-    for slow in counted:  # in place of cycles, as missions
-        in_cycles = dataset.rename({slow: CYCLE})
-        return worn_volume_statistics(in_cycles, quantiles, confidence, exceed, depth, limits).rename({CYCLE: slow})
+    for slow in map(str, {*dataset["worn_volume"].dims} - {*dataset["outcome"].dims, CYCLE}):
+        # in place of cycles, as missions
+        in_cycles = limits and {name.replace(f"{slow}s_", "cycles_"): each for name, each in limits.items()}
+        counted = worn_volume_statistics(_in_cycles(dataset), quantiles, confidence, exceed, depth, in_cycles)
+        of_lives = [name for name in map(str, counted.data_vars) if name.startswith(LIFE)]
+        return counted.rename({CYCLE: slow, **{name: name.replace("cycles_", f"{slow}s_") for name in of_lives}})
     if "cycle_count" in dataset:
         # each point has counts of its own: they share the last one only
         dataset = dataset.isel({CYCLE: [-1]})
@@ -98,11 +115,12 @@ def worn_volume_statistics(
     if section is not None and is_saltelli:
         # A and B are independent samples
         rows = rows[rows % section.rows_a_sample < 2]
-    everything, names = _read_samples(dataset, "worn_volume")
+    own = everything, names = _read_samples(dataset, "worn_volume")
     values = everything.at((..., rows))
     given = {} if limits is None else limits
     if limits is None and section is not None:
-        given = {name: limit for name, limit in section.given_limits.items() if _variable_of(dataset, name)}
+        own_limits = {name.replace("missions_", "cycles_"): limit for name, limit in section.given_limits.items()}
+        given = {name: limit for name, limit in own_limits.items() if _variable_of(dataset, name)}
     if wrong := [name for name, limit in given.items() if not (_variable_of(dataset, name) and limit > 0.0)]:
         raise ValueError(f"Give limits above 0 of what the file has, not {wrong[0]} = {given[wrong[0]]}.")
     asked = _Asked(quantiles, confidence, {"worn_volume": exceed, "wear_depth": depth}, given)
@@ -114,23 +132,31 @@ def worn_volume_statistics(
     coords: dict[str, Any] = {"bound": ["lowest", "highest"]}
     coords["quantile"] = ("quantile", np.asarray(quantiles), _about("1", "probability"))
     for name in QUANTITIES:
-        if variable := _variable_of(dataset, name):
+        variable = _variable_of(dataset, name)
+        has_lives = name == LIFE and bool(_study_of(dataset).get("slow_time", {}).get("until"))
+        has_lives &= "allowable_amplitude" not in dataset
+        if variable and (name in given or has_lives or name not in (RESPONSE, LIFE)):
             whole, own_names = _read_samples(dataset, variable)
             of_values, of_coords = _of_values(name, whole.at((..., rows)), own_names, asked)
             found, coords = found | of_values, coords | of_coords
     order = sorted(str(name).removeprefix(DRAWN) for name in dataset.coords if str(name).startswith(DRAWN))
     if inputs := [*section.inputs] if section is not None else order:
-        found |= _of_inputs(dataset, inputs, everything, confidence, names, is_saltelli=is_saltelli)
+        of, decided = ("life", _read_samples(dataset, LIFE)) if f"{LIFE}_quantile" in found else ("worn volume", own)
+        found |= _of_inputs(dataset, inputs, of, decided, confidence, is_saltelli=is_saltelli)
         coords["input"] = ("input", inputs, _about("1", "input that scatters"))
     found |= _of_groups(dataset.isel({SAMPLE: rows}), values, names)
     kept = {name: array for name, array in dataset.coords.items() if set(array.dims) <= set(names)}
     return xr.Dataset(found, kept | coords, {"title": f"Statistics of {len(rows)} samples", "confidence": confidence})
 
 
-def statistics_of_file(dataset: xr.Dataset) -> xr.Dataset | None:
-    """`worn_volume_statistics` of a file, at some counts where it has many; None without samples, or with too many."""
+def statistics_of_file(dataset: xr.Dataset, blocks: xr.Dataset | None = None) -> xr.Dataset | None:
+    """`worn_volume_statistics` of a file, at some counts where it has many; None without samples, or with too many.
+
+    blocks: variables of blocks of missions, over cycles as those of the dataset.
+    """
     if dataset.sizes.get(SAMPLE, 0) < 2 or "worn_volume" not in dataset:
         return None
+    dataset = dataset if blocks is None else _with_responses(dataset, blocks)
     counts = dataset.sizes[CYCLE]
     per_count = dataset["worn_volume"].size // counts
     if 2 * per_count > _MOST_OF_ALL:
@@ -140,42 +166,75 @@ def statistics_of_file(dataset: xr.Dataset) -> xr.Dataset | None:
     return worn_volume_statistics(dataset.isel({CYCLE: places}), QUANTILES, CONFIDENCE)
 
 
+def _study_of(dataset: xr.Dataset) -> dict[str, Any]:
+    """The study of a result; empty where it has none."""
+    try:
+        return tomllib.loads(str(dataset.attrs.get("study", "")))
+    except ValueError:
+        return {}
+
+
 def _scatter_of(dataset: xr.Dataset) -> ScatterSection | None:
     """[scatter] of the study of a result; None where there is none that fits the samples of the file."""
     try:
-        section = ScatterSection.model_validate(tomllib.loads(str(dataset.attrs.get("study", ""))).get("scatter"))
+        section = ScatterSection.model_validate(_study_of(dataset).get("scatter"))
     except ValueError:
         return None
     has_all = all(f"{DRAWN}{name}" in dataset.coords for name in section.inputs)
     return section if has_all and dataset.sizes[SAMPLE] % section.rows_a_sample == 0 else None
 
 
+def _in_cycles(dataset: xr.Dataset) -> xr.Dataset:
+    """A result of missions as one of cycles."""
+    in_cycles = _with_responses(dataset.drop_dims("block", errors="ignore"), dataset)
+    names = {"mission": CYCLE, "missions_to_target": LIFE, "last_mission": "last_cycle"}
+    names["missions_to_target_error"] = f"{LIFE}_error"
+    return in_cycles.rename({old: new for old, new in names.items() if old in in_cycles.variables})
+
+
+def _with_responses(dataset: xr.Dataset, blocks: xr.Dataset) -> xr.Dataset:
+    """With the largest response of all blocks, and the largest error."""
+    return dataset.assign({name: blocks[name].max("block") for name in (RESPONSE, "response_error") if name in blocks})
+
+
 def _read_samples(dataset: xr.Dataset, name: str) -> tuple[SampleValues, tuple[str, ...]]:
     """Samples of a variable of a result, and the dimensions before them: worn_volume, m3, wear_depth_max, m, or
-    wear_depth, m, of which the deepest pair counts, with the largest error of any pair.
+    wear_depth, m, of which the deepest pair counts, with the largest error of any pair; the largest
+    response_amplitude, m, up to a count; cycles_to_target.
 
     What was not computed lies above the last value that was, without upper bound. What is `sensitive`, or known to have
     no known error, lies within its error, which may be infinite. An error that is not in the file is infinite.
     """
     values = dataset[name].astype(float)
-    errors = dataset.get(f"{name}_error", xr.full_like(values, np.inf))
+    of_error = "response_error" if name == RESPONSE else f"{name}_error"
+    errors = dataset.get(of_error, xr.full_like(values, np.inf))
     if "contact" in values.dims:
         values, errors = values.max("contact"), errors.max("contact")
+    if "response" in values.dims:
+        values = values.isel(response=in_metres(values["response"].values)).max("response")
+        errors = errors.max("response") if "response" in errors.dims else errors
     values, outcome = values.transpose(..., SAMPLE), dataset["outcome"]
     words = dict(zip(outcome.attrs["flag_meanings"].split(), np.atleast_1d(outcome.attrs["flag_values"]), strict=False))
     value, missing = values.values, values.isnull().values
+    sensitive = (outcome == words.get("sensitive", -1)).broadcast_like(values).transpose(*values.dims).values
     low, high = np.where(missing, 0.0, value), np.where(missing, np.inf, value)
-    if CYCLE in values.dims:
-        # wear never falls
-        low = np.where(missing, np.maximum.accumulate(low, axis=values.dims.index(CYCLE)), low)
     error = errors.fillna(np.inf).broadcast_like(values).transpose(*values.dims).values.copy()
     # nothing worn is known to be nothing
     error[missing | (value == 0.0)] = 0.0
-    if name == "worn_volume":
+    if name in ("worn_volume", RESPONSE):
         # its error is relative
         error *= low
-    sensitive = (outcome == words.get("sensitive", -1)).broadcast_like(values).transpose(*values.dims).values
-    unknown = np.isinf(error) & (f"{name}_error" in dataset)
+    if CYCLE in values.dims:
+        # wear never falls, nor does the largest response
+        axis = values.dims.index(CYCLE)
+        largest = np.maximum.accumulate(low, axis=axis)
+        low, high = np.where(missing, largest, low), high
+        if name == RESPONSE:
+            low, high, error = largest, np.where(missing, np.inf, largest), np.maximum.accumulate(error, axis=axis)
+    if name == LIFE:
+        reached = dataset["last_cycle"].fillna(0.0).transpose(*values.dims).values
+        low = np.where(missing, np.where(sensitive, 0.0, reached), low)
+    unknown = np.isinf(error) & (of_error in dataset)
     found = SampleValues(low, high, error).widened((sensitive | unknown) & ~missing)
     return replace(found, low=np.maximum(found.low, 0.0)), tuple(map(str, values.dims[:-1]))
 
@@ -210,14 +269,16 @@ def _of_values(
     moved = np.maximum(samples.quantiles(values.widened(), asked.quantiles, confidence)[0], 0.0)
     about_error = _about(units, f"quantile of the {words}, with numerical error")
     found[f"{name}_quantile_error"] = ((*dims, "bound"), moved, about_error)
-    given, shown = asked.thresholds[name], f"exceeded_{name.split('_')[1]}"
+    given, shown = asked.thresholds.get(name), QUANTITIES[name].exceeded
     even = np.linspace(0.0, float(values.low.max()) or 1.0, _N_THRESHOLDS)
     above = even if given is None else np.sort(np.atleast_1d(np.asarray(given, dtype=np.float64)))
     band = samples.exceedance(values, above, confidence)
     found |= _bands(f"{name}_exceedance", f"probability of a larger {words}", "1", band, (*names, shown))
     if (limit := asked.limits.get(name)) is not None:
-        *each, n_unknown = samples.below(values, limit, confidence)
-        found |= _bands(f"{name}_below_limit", f"probability up to the limit, {words}", "1", (each[0], each[1]), names)
+        at_least = QUANTITIES[name].at_least
+        *each, n_unknown = samples.within(values, limit, confidence, at_least=at_least)
+        side = "from the limit on" if at_least else "up to the limit"
+        found |= _bands(f"{name}_within_limit", f"probability {side}, {words}", "1", (each[0], each[1]), names)
         found[f"{name}_limit"] = ((), limit, _about(units, f"limit of the {words}"))
         about_unknown = _about("1", "samples not known to be on one side of the limit")
         found[f"{name}_not_placed"] = (names, n_unknown, about_unknown)
@@ -227,22 +288,27 @@ def _of_values(
 def _of_inputs(
     dataset: xr.Dataset,
     inputs: Sequence[str],
-    values: SampleValues,
+    of: str,
+    decided: tuple[SampleValues, tuple[str, ...]],
     confidence: float,
-    names: tuple[str, ...],
     *,
     is_saltelli: bool,
 ) -> _Arrays:
-    """What each input decides, in the order of the columns of the design; of an input of pairs the mean counts."""
-    drawn, dims = [dataset[f"{DRAWN}{name}"] for name in inputs], (*names, "input")
+    """What each input decides, in the order of the columns of the design; of an input of pairs the mean counts.
+
+    of, decided: worn volume or life, in words; its samples, and the dimensions before them.
+    """
+    drawn = [dataset[f"{DRAWN}{name}"] for name in inputs]
+    values, names = decided
     table = np.stack([each.mean([d for d in each.dims if d != SAMPLE]).values for each in drawn], axis=1)
+    dims = (*names, "input")
     if is_saltelli:
-        words, d = "share of the variance that the input decides", len(inputs)
+        words, d = f"share of the variance of the {of} that the input decides", len(inputs)
         both = samples.saltelli_indices(table, values, confidence)
         first, total = ((both[0][..., part, :], both[1][..., part, :]) for part in (slice(d), slice(d, None)))
         found = _bands("first_index", f"{words} alone", "1", first, dims)
         return found | _bands("total_index", f"{words}, with the others", "1", total, dims)
-    words = "rank correlation of the worn volume with the input"
+    words = f"rank correlation of the {of} with the input"
     found = _bands("rank_correlation", words, "1", samples.rank_correlations(table, values, confidence), dims)
     # the mean over the pairs says nothing of what their own draws decide
     for _, ends, _ in found.values():

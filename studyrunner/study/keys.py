@@ -95,15 +95,25 @@ def _tables_of_deck(path: Path) -> dict[str, Given]:
     }
     if not away:
         raise UserError("command line", "--from", str(path), "give a deck with a set of nodes that can move")
-    motion = {"set": max(away, key=lambda name: away[name]), "direction": [0, 1, 0]}
+    pushed = np.zeros(3)
+    for force in deck.forces:
+        pushed[force.first_dof - 1 : min(force.last_dof, 3)] += force.value * len(force.nodes)
+    direction = [0, 1, 0] if not pushed.any() else (pushed / np.linalg.norm(pushed)).round(3).tolist()
+    motion = {"set": max(away, key=lambda name: away[name]), "direction": direction}
     in_mm = any(material.density < 1e-3 for material in deck.materials.values() if material.density)
     scene: Given = {
         "model": (str(path), ""),
         "units": ("mm-t-s" if in_mm else "SI", "of the deck; all other keys are SI"),
         "load": (motion, f"where the excitation acts; sets of the deck: {', '.join(sorted(free))}"),
         "response": ({"tip": motion}, "what is observed"),
-        "nodal_diameter": (0, "of the travelling wave, for a sector"),
+        "loss_factor": (1e-3, "damping of the material"),
     }
+    if deck.cyclic:
+        scene["nodal_diameter"] = (0, "of the travelling wave")
+    elif not (deck.forces or deck.pressures or deck.centrifugal):
+        press = [{"set": motion["set"], "direction": [0, 0, -1], "force": 500.0}]
+        scene["# preload"] = (press, "N, what presses the surfaces together: the deck has no static load")
+        scene["# retention_stiffness"] = (1e6, "N/m, against motions that friction alone would hold: see --check")
     if any(pair.friction_coefficient is None for pair in deck.contact_pairs) or not deck.contact_pairs:
         scene["friction_coefficient"] = (0.3, "")
     if not deck.contact_pairs and not deck.ties:

@@ -1,6 +1,7 @@
 """What is wrong with the tables of a study: one sentence for each key that pydantic or a rule between keys refuses."""
 
 import difflib
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -14,6 +15,22 @@ from studies.scene_error import SceneError, remedy_of
 from studyrunner.user_error import UserError, Verbatim
 from studyrunner.values import Section, Wrong
 
+_NUMBERS = ("float_type", "int_type", "value_error")
+_SIZES = {
+    1.0: "m m3 N Pa 1/Pa Hz s kg rpm",
+    1e-2: "cm %",
+    1e-3: "mm mN",
+    1e-6: "um mm2 1/MPa mm2/N",
+    1e-9: "nm mm3 mm3/J mm3/Nm mm3/(Nm)",
+    1e-18: "um3",
+    1e3: "kN kPa kHz N/mm t",
+    1e6: "MPa",
+    1e9: "GPa",
+    60.0: "min",
+    3600.0: "h",
+}
+_UNITS = {unit: size for size, units in _SIZES.items() for unit in units.split()}
+"""Of units that are written behind a number, their size in the unit of the key."""
 _SINGLE = ("float_type", "int_type", "bool_type", "string_type")
 
 
@@ -155,8 +172,22 @@ def _wrong(key: str, found: Sequence[_Mistake], elsewhere: Mapping[str, str]) ->
     own_axes = [name for each in tables for name in getattr(each, "AXES", each.model_fields)]
     if isinstance(value, list) and kind in _SINGLE and key in own_axes:
         return Wrong(key, value, f"give one value here, or the list as axes.{key}{meaning}")
+    if isinstance(value, str) and (number := _in_si(value)) and kind in _NUMBERS:
+        return Wrong(key, value, f"give {number}, the number in SI without a unit{meaning}")
     remedies = dict.fromkeys(remedy_of(each.details).removeprefix("give ") for each in found)
     return Wrong(key, value, f"give {', or '.join(remedies)}{meaning}")
+
+
+def _in_si(text: str) -> str:
+    """A number with a unit, as "5 um", as the number in SI; "" for any other text."""
+    found = re.fullmatch(r"\s*([-+]?[\d.]+(?:[eE][-+]?\d+)?)\s*(.+)", text)
+    unit = found[2].replace(" ", "") if found else ""
+    for micro in "\N{GREEK SMALL LETTER MU}\N{MICRO SIGN}":
+        unit = unit.replace(micro, "u")
+    try:
+        return f"{float(found[1]) * _UNITS[unit]:.12g}" if found else ""
+    except (ValueError, KeyError):
+        return ""
 
 
 def tables_in(annotation: object) -> list[type[BaseModel]]:

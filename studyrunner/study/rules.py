@@ -6,7 +6,7 @@ from typing import Any, cast, get_args
 
 from solver.settings import FIRST_HARMONICS
 from studyrunner.kinds.table import KINDS
-from studyrunner.scatter import OF_PAIRS
+from studyrunner.scatter import LIVES, OF_PAIRS
 from studyrunner.study.mistakes import nearest_name
 from studyrunner.study.sections import ALLOWABLE, AUTO, DEFAULT
 from studyrunner.study.study import Study
@@ -126,16 +126,29 @@ def _evolution(study: Study) -> Iterator[Wrong]:
             yield Wrong(f"scatter.{name}", None, remedy)
 
 
+def _limits(study: Study) -> Iterator[Wrong]:
+    """Limits are of the wear after all cycles, or with a target of the life until then."""
+    limits = study.scatter.given_limits if study.scatter else {}
+    counted, until = study.kind.counted, study.slow_time.until
+    life = f"{counted}s_to_target"
+    if limits and (not counted or study.allowable):
+        remedy = "leave it out: it asks for the wear after all cycles or missions at a given excitation"
+        yield Wrong("scatter.limits", limits, remedy)
+    elif (until and {*limits} - {life}) or {*limits} & LIVES - {life if until else ""}:
+        remedy = f"give {life} with slow_time.until, of histories that end there, other limits without until"
+        yield Wrong("scatter.limits", limits, remedy)
+    elif until and limits and limits[life] > study.output_counts[-1]:
+        remedy = f"give at most the {study.output_counts[-1]:g} {counted}s of slow_time"
+        yield Wrong(f"scatter.limits.{life}", limits[life], remedy)
+
+
 def _scatter(study: Study) -> Iterator[Wrong]:
     """Inputs of [scatter] are known and can scatter beside the other tables."""
     fields = type(study.scene.parameters).model_fields
     # numbers with fractions
     floats = [name for name, field in fields.items() if float in (field.annotation, *get_args(field.annotation))]
     known = [*study.kind.numbers, *OF_PAIRS, *floats, *study.wear.numbers]
-    limits = study.scatter and study.scatter.given_limits
-    if limits and (not study.kind.counted or study.slow_time.until is not None):
-        remedy = "leave it out: it asks for the wear after all cycles or missions, without slow_time.until"
-        yield Wrong("scatter.limits", limits, remedy)
+    yield from _limits(study)
     for name, scattered in study.scatter.inputs.items() if study.scatter else ():
         several = name in study.kind.numbers and len(getattr(study.axes, name) or ()) > 1
         giving = any(block.gives(name) for block in study.mission)

@@ -200,6 +200,7 @@ def _complete(study: Study) -> Study:
         names |= {"mesh"} & {*study.scene.source.offers}
     if study.scatter is not None and study.scatter.given_limits:
         names |= {"worn_volume", "worn_volume_error", "wear_depth_max", "wear_depth_max_error"}
+        names |= {"response_amplitude", "response_error"}
     known = dict.fromkeys((*KINDS["wear"].asked, *SCENE, *kind.asked))
     outputs = study.outputs.model_copy(update={"variables": tuple(name for name in known if name in names)})
     update |= {

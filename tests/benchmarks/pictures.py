@@ -1,9 +1,13 @@
-"""Draws the pictures of the bundled study in `studies/pictures` and writes down the numbers that they show.
+"""Draws the pictures of the bundled studies in `studies/pictures` and writes down the numbers that some show.
 
     OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.pictures dovetail.nc
+    OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.pictures scatter.nc mission.nc ...
+    OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.pictures time-scales
 
-`dovetail.nc` is the result of the bundled study. Written are the PNG files of `SHOWN`, as the report draws them, and
-`numbers.json`: the study, what the artists of each figure of `NAMES` hold, and a checksum of each picture.
+Results of other bundled studies give one small picture each, the figure of `GALLERY`; `time-scales` a wear history of
+the slider, as the theory explains it. Of `dovetail.nc`, the result of the bundled study, the PNG files of `SHOWN` are
+written, as the report draws them, and `numbers.json`: the study, what the artists of each figure of `NAMES` hold, and a
+checksum of each picture.
 `tests/studyrunner/test_bundled_studies.py` compares all of that with the bundled study, with the files, and with points
 that are computed anew.
 """
@@ -24,6 +28,8 @@ from matplotlib.container import ErrorbarContainer
 from PIL import Image
 
 import studies
+from studyrunner import run_study
+from studyrunner.report import drawing as plot
 from studyrunner.report.contents import draw_report
 from studyrunner.report.drawing import Drawing
 from studyrunner.result.view import open_for_report
@@ -33,6 +39,23 @@ NUMBERS = "numbers.json"
 SHOWN = ("final_worn_volume", "worn_profile", "worn_root", "worn_volume_map")  # on the pages
 NAMES = (*SHOWN, "frequency_response")
 WIDTH, COLOURS = 1200, 128  # of a picture: pixels, and of its palette
+SMALL = 720  # pixels of a picture of `GALLERY`
+GALLERY = {
+    "blade_root": "worn_root",
+    "cylinder_on_flat": "worn_profile",
+    "damper": "worn_root",
+    "extremes": "outcome_map",
+    "mission": "block_shares",
+    "modes": "damping_ratio",
+    "scatter": "worn_volume_bands",
+    "sdof_slider": "final_worn_volume",
+    "shrouded": "worn_root",
+    "sphere_on_flat": "wear_depth",
+    "two_masses": "frequency_response",
+    "vibro_impact": "frequency_response",
+}
+"""Figure of the report by study."""
+COUNTS, LAST = (0, 16, 40), 200_000  # of the picture of the time scales: places of the outputs, cycles
 MOST_POINTS, DIGITS = 30, 6  # of a line that is written down, and of its numbers
 
 
@@ -89,8 +112,58 @@ def drawings_of(path: str, names: tuple[str, ...]) -> dict[str, Drawing]:
     return {name: drawn[name] for name in names}
 
 
+def write_small(path: str) -> None:
+    """Writes the picture of a bundled study, from its result."""
+    study = Path(path).stem
+    result = open_for_report(Path(path))
+    # solids, and long labels, need room
+    items = draw_report(result, plot.WIDTH if GALLERY[study] in ("worn_root", "outcome_map") else plot.COLUMN_WIDTH)
+    (drawing,) = (item for item in items if isinstance(item, Drawing) and item.name == GALLERY[study])
+    with tempfile.TemporaryDirectory() as large:
+        png = shrink(drawing.save(Path(large)).with_suffix(".png").read_bytes(), SMALL)
+    (FOLDER / f"study_{study}.png").write_bytes(png)
+
+
+def draw_time_scales() -> None:
+    """Writes the picture of the two time scales: friction through a period, and wear over the cycles."""
+    given = {"axes.frequency": 160.0, "axes.excitation_amplitude": 10.0, "axes.scheme": "adaptive"}
+    given |= {"slow_time.cycles": LAST, "slow_time.outputs": COUNTS[-1] + 1, "outputs.loops": [0]}
+    with tempfile.TemporaryDirectory() as folder, plot.style():
+        result = run_study(
+            "sdof_slider", Path(folder) / "slider.nc", overrides={**given, "axes.wear_coefficient": 1.1e-11}
+        )
+        result = result.squeeze([*result["outcome"].dims])
+        figure, panels = plot.new_panels(1, 2, 2.6)
+        (fast, slow), depth = panels[0], 1e6 * result["wear_depth"].values[:, 0]
+        slow.plot(1e-3 * result["cycle"], depth, color="0.6")
+        for number, place in enumerate(COUNTS):
+            loop, look = (
+                result.isel(cycle=[place]).fretwear.loop(0).isel(cycle=0),
+                plot.line_style(number) | {"marker": ""},
+            )
+            label = f"cycle {int(result['cycle'][place]):,}".replace(",", " ")
+            fast.plot(1e3 * loop["phase"] / (2.0 * np.pi * 160.0), loop["force"][:, 1], **look, label=label)
+            slow.plot(1e-3 * result["cycle"][place], depth[place], marker="o", color=look["color"])
+        fast.set(xlabel="fast time, one period (ms)", ylabel="friction force (N)")
+        slow.set(xlabel="slow time (kcycles)", ylabel="wear depth (µm)", ylim=(0.0, None), xlim=(0.0, None))
+        plot.add_legend(figure)
+        png = shrink(Drawing("time_scales", "", "", figure).save(Path(folder)).with_suffix(".png").read_bytes(), WIDTH)
+    (FOLDER / "time_scales.png").write_bytes(png)
+
+
 def main() -> None:
-    (dovetail,) = sys.argv[1:]
+    names = sys.argv[1:]
+    if names == ["time-scales"]:
+        draw_time_scales()
+    elif [Path(name).stem for name in names] == ["dovetail"]:
+        write_dovetail(*names)
+    else:
+        for name in names:
+            write_small(name)
+
+
+def write_dovetail(dovetail: str) -> None:
+    """Writes the pictures of the dovetail, and their numbers."""
     drawings = drawings_of(dovetail, NAMES)
     figures = {
         name: {

@@ -3,16 +3,18 @@
 import hashlib
 import json
 import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import studyrunner
 from solver.outcome import COMPLETE, Outcome
 from studyrunner import read_study, run_study
 from studyrunner.cli import main
 from studyrunner.study.study_file import bundled_studies, format_study
 from studyrunner.summary.answer import summary
-from tests.benchmarks.pictures import FOLDER, NAMES, NUMBERS
+from tests.benchmarks.pictures import FOLDER, GALLERY, NAMES, NUMBERS
 from tests.mpi.launching import options, results
 from tests.studyrunner.small_studies import compute
 
@@ -132,6 +134,24 @@ def test_every_point_of_the_extremes_is_whole_or_says_why_not():
     assert (result.wear_depth.isel(cycle=0).fillna(0.0) == 0.0).all()
     assert (result.wear_depth.diff("cycle").fillna(0.0) >= 0.0).all()
     assert summary(result).n_points == result.outcome.size
+
+
+# --- the pictures of the other studies ---
+
+
+def test_each_bundled_study_has_a_small_picture_on_the_page_that_lists_them():
+    page = (Path(studyrunner.__file__).parent / "FIRST_JOB.md").read_text(encoding="utf-8")
+    own = {
+        "dovetail": "worn_root",
+        "running_in": "running_in_frequency",
+        **dict.fromkeys(("work_precision", "work_precision_slider"), "error_against_time"),
+    }
+    own |= {study: f"study_{study}" for study in GALLERY}
+    assert set(own) == set(bundled_studies())
+    for study, name in own.items():
+        assert f"`{study}`" in page
+        assert f"pictures/{name}.png)" in page
+        assert (FOLDER / f"{name}.png").stat().st_size < (60_000 if study in GALLERY else 100_000)
 
 
 # --- the pictures of the dovetail, and the numbers written down with them ---

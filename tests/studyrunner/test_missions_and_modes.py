@@ -171,6 +171,28 @@ def test_an_engine_order_is_a_frequency_by_the_speed_of_the_block():
 
 
 @pytest.mark.slow
+def test_samples_of_missions_say_how_long_they_last_and_why(blocks):
+    scatter = "{samples=16, friction_coefficient={normal={std=0.03}}, wear_coefficient={lognormal={factor=2.0}}}"
+    whole = run(*ONE, f"scatter={scatter}")
+    depth = float(whole.wear_depth_max.isel(mission=-1).max())
+    end, least = f"slow_time.until={{wear_depth={0.3 * depth!r}}}", "scatter.limits={missions_to_target=150}"
+    result = run(*ONE, f"scatter={scatter}", end, least, output="lives.nc")
+    lives = result.missions_to_target.values.ravel()
+    n_old = int((~(lives < 150.0)).sum())
+    assert 0 < n_old < 16
+    found = summary(result)
+    assert found.values["limits"]["missions_to_target"]["probability"] == pytest.approx([n_old / 16.0] * 2)
+    assert "samples last" in found.lines[0]
+    assert found.values["input"] == {}
+    assert "of the life, wear coefficient decides most" in " ".join(str(found).split())
+    # a limit that was not asked for
+    largest = float(result.response_amplitude.max())
+    counted = result.fretwear.worn_volume_statistics(limits={"response_amplitude": 1.01 * largest})
+    assert (counted.response_amplitude_within_limit.isel(mission=0) == 1.0).all()
+    assert "missions_to_target_quantile" in counted
+
+
+@pytest.mark.slow
 def test_samples_draw_what_all_blocks_have(blocks):
     scatter = "{samples=3, friction_coefficient={normal={std=0.03}}, normal_load={normal={std=0.5}}}"
     result = run(*ONE, f"scatter={scatter}")

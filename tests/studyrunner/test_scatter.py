@@ -196,6 +196,13 @@ def test_a_run_ends_with_the_probability_of_its_limits(capsys):
     limit = f"scatter.limits={{wear_depth={0.5 * (depths[5] + depths[6])}}}"
     compute("sdof_slider", "p.nc", *given, limit)
     assert "6 of 8 samples" in capsys.readouterr().out
+    # the other half of the same question: how many last so long
+    end = f"slow_time.until={{wear_depth={0.5 * (depths[2] + depths[3])}}}"
+    lives = compute("sdof_slider", "q.nc", *given, end, "scatter.limits={cycles_to_target=1.5e3}")
+    n_old = int((~(lives.cycles_to_target < 1.5e3)).sum())
+    said = capsys.readouterr().out
+    assert f"{n_old} of 8 samples" in said
+    assert "samples last" in said
 
 
 @pytest.mark.slow

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from numba.core.event import trigger_event
 
+from studyrunner.kinds.task import Part
 from studyrunner.mpi import dispatch
 from studyrunner.mpi.dispatch import CostModel, Dispatcher
 from studyrunner.mpi.ranks import Ranks, launcher_rank, launcher_size
@@ -154,9 +155,10 @@ def test_a_bar_on_a_terminal(monkeypatch):
     assert "5 of 20 points, 25 %, about 30 s left, running: 210 Hz implicit" in screen.getvalue()
 
 
-def tasks_of():
+def tasks_of(*overrides):
     axes = ("frequency={start=1, stop=2, num=8}", "wear_coefficient=[1e-12, 7e-12]", "step=1000", "scheme=implicit")
-    return plan_of(read_study("sdof_slider", [f"axes.{each}" for each in (*axes, "sweep=['up', 'down']")]), 2)
+    given = [*(f"axes.{each}" for each in (*axes, "sweep=['up', 'down']")), *overrides]
+    return plan_of(read_study("sdof_slider", given), 2)
 
 
 def swept(progress, plan):
@@ -190,6 +192,22 @@ def test_the_seconds_left_fall_to_none_and_follow_what_was_measured():
             assert progress.look(()).seconds_left == pytest.approx(left, rel=0.3, abs=1e-9)
     assert progress.look(()).seconds_left == pytest.approx(0.0, abs=1e-9)
     assert progress.look(()).n_done == progress.look(()).n_points == plan.n_points
+
+
+def test_a_task_that_says_how_far_it_is_tells_the_time_left(monkeypatch):
+    plan = tasks_of("axes.wear_coefficient=1e-12")
+    progress, now = StudyRun(MemoryIndex(plan), None, None, 1), 100.0
+    monkeypatch.setattr("studyrunner.task_runs.time.monotonic", lambda: now)
+    history, *waiting = swept(progress, plan)
+    alike = sum(task.cost for task in waiting if task.group == history.group)
+    rest = sum(task.cost for task in waiting) - alike
+    progress.keep(history, Part(0.25, "1 of 4"))
+    now = 110.0
+    # a quarter was done in 50 s, 10 s ago; similar tasks take as many times their estimate
+    left = 140.0 + alike * 200.0 / history.cost + rest
+    found = progress.look([(history, 1, 60.0)])
+    assert found.seconds_left == pytest.approx(left, rel=1e-6)
+    assert "1 of 4" in found.running[0]
 
 
 def test_a_few_cheap_results_do_not_shorten_the_time_left():

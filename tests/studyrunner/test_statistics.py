@@ -13,13 +13,13 @@ from studyrunner.scatter import ScatterSection, unit_design
 from studyrunner.statistics.samples import (
     FEWEST,
     SampleValues,
-    below,
     deciding_pair,
     exceedance,
     quantiles,
     rank_correlations,
     saltelli_indices,
     two_groups,
+    within,
 )
 from studyrunner.statistics.sentences import describe_limit, describe_ranking, describe_volumes, what_samples_tell
 from studyrunner.statistics.study_statistics import worn_volume_statistics
@@ -101,12 +101,12 @@ def test_the_probability_of_a_limit_has_the_samples_on_no_known_side_on_both():
     value = np.arange(1.0, 11.0)
     # 5 and 6 lie within their errors of the limit, one ended below it, one above
     values = SampleValues(value, np.where(np.isin(value, [2.0, 9.0]), np.inf, value), np.where(value < 7, 0.6, 0.1))
-    band, interval, n_unknown = below(values, 5.5, 0.95)
+    band, interval, n_unknown = within(values, 5.5, 0.95)
     np.testing.assert_allclose(band, [0.3, 0.6])
     ends = [binomtest(k, 10).proportion_ci(0.95, "exact") for k in (3, 6)]
     np.testing.assert_allclose(interval, [ends[0].low, ends[1].high])
     assert n_unknown == 3
-    _, interval, n_unknown = below(known(value, np.inf), 5.5, 0.95)
+    _, interval, n_unknown = within(known(value, np.inf), 5.5, 0.95)
     assert (interval.tolist(), n_unknown) == ([0.0, 1.0], 10), "without a known error nothing is known"
 
 
@@ -319,13 +319,43 @@ def test_limits_are_those_of_the_study_or_given_and_samples_that_failed_are_not_
     found = worn_volume_statistics(dataset).isel(frequency=0, cycle=-1)
     n_unknown = int(found["wear_depth_not_placed"])
     assert f"{n_below} of 128 samples, {n_unknown} not known" in describe_limit(found, "wear_depth")
-    np.testing.assert_allclose(found["wear_depth_below_limit"], np.array([n_below, n_below + n_unknown]) / 128)
+    np.testing.assert_allclose(found["wear_depth_within_limit"], np.array([n_below, n_below + n_unknown]) / 128)
     assert "deepest pair" in describe_volumes(found)
     assert "worn_volume_limit" not in found
     given = worn_volume_statistics(dataset, limits={"worn_volume": 1.0})
-    assert (given["worn_volume_below_limit"] == 1.0).all()
+    assert (given["worn_volume_within_limit"] == 1.0).all()
     with pytest.raises(ValueError, match="not wear_depth = -1"):
         worn_volume_statistics(dataset, limits={"wear_depth": -1.0})
+
+
+def test_a_limit_of_the_response_is_of_the_largest_so_far_and_that_of_the_life_is_the_least():
+    text = SCATTER + "limits = {response_amplitude = 3e-5, cycles_to_target = 4e4}\n"
+    dataset = sample_file(text).drop_dims("response")
+    n, n_counts = dataset.sizes["sample"], dataset.sizes["cycle"]
+    place = np.arange(n) / n
+    falls = np.linspace(1.0, 0.5, n_counts) * 4e-5 * place[:, None] * np.ones((2, 1, 1))
+    # stress is no response that this limit is of
+    both = np.stack([falls, 1e9 + falls], axis=-1)
+    lives, ended = np.where(place < 0.9, 1e5 * place, np.nan), np.where(place < 0.9, 1e5 * place, 1e5)
+    dims = ("frequency", "sample")
+    found = worn_volume_statistics(
+        dataset.assign(
+            response_amplitude=((*dims, "cycle", "response"), both),
+            response_error=((*dims, "cycle"), np.full((2, n, n_counts), 1e-6)),
+            cycles_to_target=(dims, [lives, lives]),
+            cycles_to_target_error=(dims, np.full((2, n), 1.0)),
+            last_cycle=(dims, [ended, ended]),
+        ).assign_coords(response=["tip", "stress [MPa]"])
+    )
+    quiet, old = (4e-5 * place <= 3e-5).mean(), (place >= 0.4).mean()
+    np.testing.assert_allclose(found["response_amplitude_within_limit"], quiet, atol=1.5 / n)
+    np.testing.assert_allclose(found["cycles_to_target_within_limit"], old, atol=1e-12)
+    # those that live on when all cycles are over have no upper end
+    assert found["cycles_to_target_quantile"].sel(quantile=0.95, bound="highest").isin(np.inf).all()
+    point = found.isel(frequency=0, cycle=-1)
+    assert describe_volumes(point).startswith("90 % of 128 samples last")
+    assert re.match(r"life at least 40.000 cycles: 59.4 % probable", describe_limit(point, "cycles_to_target"))
+    assert "amplitude at most 0.03 mm" in describe_limit(point, "response_amplitude")
 
 
 def test_two_hills_are_reported_with_the_pair_that_decides():

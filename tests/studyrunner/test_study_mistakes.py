@@ -159,6 +159,9 @@ scatter.samples, scatter.mu.normal.sigma, axes.damping, scene.area, scene.mas
         scatter.limits={{worn_volume='1 mm3'}} -> scatter.limits.worn_volume
         scatter.limits={{}}
         slow_time.until={{wear_depth=1e-5}} ; scatter.limits={{wear_depth=5e-6}}
+        scatter.limits={{cycles_to_target=5}}
+        slow_time.until={{wear_depth=1e-5}} ; scatter.limits={{missions_to_target=5}}
+        slow_time.until={{wear_depth=1e-5}} ; scatter.limits={{cycles_to_target=1e9}} -> scatter.limits.cycles_to_target
         scatter={{limits={{wear_depth=5e-6}}}} -> scatter.samples
         scatter={{samples=8, limits={{wear_depth=5e-6}}}} -> scatter.samples
         scatter.mass={{normal={{std=1}}}}
@@ -314,3 +317,19 @@ def test_write_protected_output(files, refuses, monkeypatch):
     (files / "s.toml").write_text(small.SLIDER, encoding="utf-8")
     monkeypatch.setattr(os, "access", lambda *_: False)
     refuses(["s.toml", "-o", "worn.nc", "--overwrite"], "command line: -o")
+
+
+@pytest.mark.parametrize(
+    ("given", "number"),
+    [
+        ("scatter.limits.wear_depth = '5 \N{MICRO SIGN}m'", "5e-06"),
+        ("slow_time.until={wear_depth = '5um'}", "5e-06"),
+        ("axes.excitation_amplitude=['5 kN']", "5000"),
+        ("axes.wear_coefficient='2e-7 1/MPa'", "2e-13"),
+        ("axes.wear_coefficient='2e-4 mm3/(N m)'", "2e-13"),
+    ],
+)
+def test_a_number_with_a_unit_is_said_in_si(given, number, capsys):
+    key, _, value = given.partition("=")
+    assert main(["sdof_slider", "--plan", "--set", f"{key.strip()}={value.strip()}"]) == 2
+    assert f"give {number}, the number in SI" in capsys.readouterr().err

@@ -110,14 +110,32 @@ def test_the_deepest_pair_with_its_place_and_the_wear_at_the_edge(name):
     assert (found.values["deepest"]["contact"], found.values["deepest"]["also"]) == (1, [4])
 
 
+def test_selected_and_squeezed_results_have_the_same_summary():
+    one = wearing("axes.frequency=160", "axes.wear_coefficient=1e-13", "axes.scheme=adaptive", "axes.step=1")
+    whole = str(one.fretwear.summary())
+    assert "squeezed" not in whole
+    assert str(one.squeeze().fretwear.summary()) == whole
+    several = wearing(*GRID)
+    last = several.isel(cycle=-1, frequency=1)
+    assert last.fretwear.summary().values["wear"]["worn_volume"] == pytest.approx(1e-9)
+    assert "cycle" not in last.dims
+
+
 # --- nothing wore ---
 
 
 def test_nothing_wore_says_why():
     still = summary(wearing("axes.frequency=[1, 2, 3]", "axes.scheme=adaptive", volume=lambda _: 0.0))
-    assert still.values["wear"] == {"worn_volume": 0.0, "largest_slip": 0.0, "friction_use": 0.0}
+    expected = {"worn_volume": 0.0, "largest_slip": 0.0, "friction_use": 0.0}
+    assert {name: still.values["wear"][name] for name in expected} == expected
     near = wearing("axes.frequency=[1, 2]", volume=lambda _: 0.0, friction_use=lambda p: np.full(21, 0.4 + 0.1 * p[0]))
     assert summary(near).values["wear"]["friction_use"] == 0.5
+    amplitudes = ("axes.frequency=[1, 2]", "axes.excitation_amplitude=[2, 3]")
+    ends = {(0, 0): 8.0, (0, 1): math.nan, (1, 0): 6.5, (1, 1): 7.0}
+    begins = wearing(*amplitudes, volume=lambda _: 0.0, slip_amplitude=lambda p: ends[p[0], p[2]], name="sdof_slider")
+    # of the point that is nearest to it
+    assert summary(begins).values["wear"]["slip_amplitude"] == 7.0
+    assert "7 N at 2 Hz, extrapolated from 3 N" in " ".join(str(summary(begins)).split())
     slips = wearing("axes.frequency=[1, 2]", volume=lambda _: 0.0, slip_range=lambda p: np.full((21, 2), 1e-6 * p[0]))
     assert summary(slips).values["wear"]["largest_slip"] == 1e-6
     some = wearing(*GRID, volume=lambda _: 0.0, outcome=lambda p: FAILED if p[0] else 0)

@@ -48,6 +48,23 @@ def test_the_law_of_a_study_is_the_one_that_wears():
     assert both[1] == final(*power, half)[0] > 0.6 * both[0]
 
 
+# --- where slip begins ---
+
+
+def test_slip_begins_where_the_joint_that_sticks_says():
+    """Of a slider at friction times load; of a dovetail, whose pairs come to rest, near the end of rest."""
+    rest = ("slow_time.cycles=0", "slow_time.outputs=1", "axes.scheme=adaptive")
+    slider = run(*rest, "axes.frequency=150", "axes.excitation_amplitude=[1, 3, 6]")
+    np.testing.assert_allclose(slider.slip_amplitude.values.ravel(), [5.0, 5.0, np.nan], rtol=1e-9)
+    root = (*rest, "scene.mesh=1", "axes.frequency=200", "axes.wear_coefficient=1e-11", "solver.rtol=1e-2")
+    far = compute("dovetail", "far.nc", *root, "axes.excitation_amplitude=[1, 11, 12.5]")
+    first, near, slips = far.slip_amplitude.values.ravel()
+    assert first == pytest.approx(12.0, rel=0.3)
+    assert near == pytest.approx(12.0, rel=0.08)
+    assert np.isnan(slips)
+    assert far.slip_range.max(("cycle", "contact")).values.ravel().astype(bool).tolist() == [False, False, True]
+
+
 # --- where histories end ---
 
 

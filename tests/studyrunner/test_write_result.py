@@ -87,6 +87,8 @@ CONTRACT = {
         ((), "s", "run_time"),
         ((), "Hz", "fold_frequency"),
         ((), "m", "largest_wear_depth"),
+        (("cycle",), "m", "wear_depth_max wear_depth_max_error"),
+        ((), "N", "slip_amplitude"),
     )
     for name in names.split()
 }

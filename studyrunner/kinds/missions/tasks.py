@@ -12,12 +12,13 @@ from solver.contact.wear_law import WearLaw
 from solver.missions.mission import Begin, Block, MissionRequest
 from solver.model import ReducedModel
 from solver.packing import Packed
-from solver.settings import Direction, Passage, WearTarget
+from solver.settings import Direction, Passage, SolverSettings, WearTarget
 from studyrunner.kinds import task as tasks
 from studyrunner.kinds.estimate import iterations_of_sweep, seconds_of
 from studyrunner.kinds.missions.kind import OF_A_MISSION
 from studyrunner.kinds.results import deepest, describe_target, first_harmonic, named
 from studyrunner.points.table import Points
+from studyrunner.study.sections import AUTO
 from studyrunner.study.study import Study
 from studyrunner.system.progress import count
 
@@ -37,6 +38,10 @@ of 20 on a slider, 18 to 26 of thousands on a dovetail, 42 of a million on a sli
 _A_WAY = 0.5
 """Iterations of the way to a block in a later mission, over those of the first one (dovetail with 16 pairs: 150 to 190
 of 320 to 380; one pair that slips: 2 of 14 missions with 20 missions, 12 of 84 with a million)."""
+
+
+_AS_OTHERS, _HARMONICS_BY_RTOL = 0.05, 0.66
+"""Share of the estimate: 0.4 and 0.5 of it with rtol = 0.1, three times of it with 0.01 (dovetail with 16 pairs)."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +95,10 @@ class Mission(tasks.Task):
 
         def note(progress: Packed) -> None:
             keep(progress)
-            keep(f"{next(n_computed)} of about {n_planned} missions that are computed")
+            n = next(n_computed)
+            # the first one has the ways to all blocks
+            share = (n + 1) / (max(n_planned, n + 1) + 1)
+            keep(tasks.Part(share, f"{n} of about {n_planned} missions that are computed"))
 
         wanted = {int(number) for number in self.missions}
         # with those before, for the wear of one
@@ -120,7 +128,7 @@ def build_tasks(study: Study, points: Points, n_displacements: Sequence[int]) ->
             number=0,
             scenes=scenes,
             settings=settings,
-            cost=seconds_of(n_unknowns, _iterations(ways, study.output_counts[-1])),
+            cost=seconds_of(n_unknowns, _iterations(ways, study.output_counts[-1])) * _finer(settings),
             n_unknowns=n_unknowns,
             blocks=blocks,
             law=law,
@@ -132,6 +140,12 @@ def build_tasks(study: Study, points: Points, n_displacements: Sequence[int]) ->
         )
         found.setdefault(task, []).extend(numbers)
     return tasks.number_points({task: [numbers] for task, numbers in found.items()}, points.n)
+
+
+def _finer(settings: SolverSettings) -> float:
+    """Estimated time of an iteration over that of any state: automatic harmonics are more where less is allowed."""
+    is_automatic = AUTO in (settings.harmonics, settings.samples)
+    return (_AS_OTHERS / settings.rtol) ** _HARMONICS_BY_RTOL if is_automatic else 1.0
 
 
 def _n_computed(missions: float) -> int:

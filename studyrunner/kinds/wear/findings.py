@@ -13,12 +13,15 @@ from studyrunner.coordinates import SAMPLE
 from studyrunner.kinds.wear.sought import find_allowable
 from studyrunner.result.pairs import contact_pairs, has_depths, last_depth
 from studyrunner.result.view import NO_MOTION, NO_VOLUME, Point, Result
+from studyrunner.statistics.samples import DRAWN
 from studyrunner.statistics.sentences import describe_limit, describe_ranking, describe_volumes
+from studyrunner.statistics.study_statistics import LIFE, QUANTITIES
 from studyrunner.summary.findings import LEAST_ERROR, Finding, show, where_is, with_error
 from studyrunner.system.progress import count
 from studyrunner.units import show_cycles, show_known, show_number, show_percent
 
 _MOST_ALIKE = 3
+_AFTER_THE_START = ("excitation_amplitude", "wear_coefficient", "step", "scheme")  # what slip does not depend on
 MEASURED_POWER = (2e3, 4.3e5)
 """Power densities of friction, W/m2, of the tests of the law "power" (Fouvry and others 2017)."""
 
@@ -81,6 +84,11 @@ def _wear_and_response(result: Result, stuck: float) -> Iterator[Finding]:
             yield _deepest(result, point, result.last_reached(point), f" ({where_is(result, point)})")
         else:
             yield from _of_wear(result, point) if wears else [_nothing(result, resonance)]
+    elif result.statistics is not None and f"{LIFE}_quantile" in result.statistics:
+        # all points may end before the first count at which the file could hold wear
+        lives, ranking = _of_samples(result)
+        yield Finding("wear", "wear", lives)
+        yield from [Finding("input", "input", ranking)] if ranking else []
     elif result.wears and result.has("worn_volume", "error_estimate") and result.computed.any():
         yield Finding("wear", "wear", "no worn volume is known within 50 %")
     yield from _of_limits(result)
@@ -110,29 +118,38 @@ def _of_wear(result: Result, point: dict[str, int]) -> Iterator[Finding]:
 
 
 def _of_samples(result: Result) -> tuple[str, str]:
-    """Worn volumes of the samples where their median is largest, and which input decides; empty without samples."""
+    """Worn volumes of the samples where their median is largest, or lives where it is least, and which input decides;
+    empty without samples.
+    """
     if result.statistics is None:
         return "", ""
     last = result.statistics.isel(cycle=-1, missing_dims="ignore")
-    medians = last["worn_volume_quantile"].sel(quantile=0.5).isel(bound=0)
-    there, where = _chosen(result, last, int(np.argmax(medians.values)), "with the largest median")
-    return f"{describe_volumes(there)} after {result.cycle_label(-1)}{where}", describe_ranking(there)
+    of_life = f"{LIFE}_quantile" in last
+    medians = last[f"{LIFE if of_life else 'worn_volume'}_quantile"].sel(quantile=0.5).isel(bound=0).values
+    flat, why = (np.argmin(medians), "shortest") if of_life else (np.argmax(medians), "largest")
+    there, where = _chosen(result, last, int(flat), f"with the {why} median")
+    said, ranking = describe_volumes(there), describe_ranking(there)
+    if of_life:
+        return said.replace("cycles", result.counted) + where, f"of the life, {ranking}" if ranking else ""
+    return f"{said} after {result.cycle_label(-1)}{where}", ranking
 
 
 def _of_limits(result: Result) -> Iterator[Finding]:
     """The probability of each limit, where it is least."""
     last = xr.Dataset() if result.statistics is None else result.statistics.isel(cycle=-1, missing_dims="ignore")
     texts, values = list[str](), dict[str, Any]()
-    for name in ("wear_depth", "worn_volume"):
+    for name in QUANTITIES:
         if f"{name}_limit" in last:
-            least = int(np.argmin(last[f"{name}_below_limit_interval"].isel(bound=0).values))
+            least = int(np.argmin(last[f"{name}_within_limit_interval"].isel(bound=0).values))
             there, where = _chosen(result, last, least, "that is least probable")
             texts.append(describe_limit(there, name) + where)
-            parts = {"limit": "limit", "probability": "below_limit", "interval": "below_limit_interval"}
-            values[name] = {key: there[f"{name}_{each}"].values.tolist() for key, each in parts.items()}
-            values[name]["n_unknown"] = int(there[f"{name}_not_placed"])
+            parts = {"limit": "limit", "probability": "within_limit", "interval": "within_limit_interval"}
+            own = name.replace("cycles", result.counted)
+            values[own] = {key: there[f"{name}_{each}"].values.tolist() for key, each in parts.items()}
+            values[own]["n_unknown"] = int(there[f"{name}_not_placed"])
     if texts:
-        yield Finding("limits", "limits", f"after {result.cycle_label(-1)}: {'; '.join(texts)}", values)
+        after = "" if f"{LIFE}_limit" in last else f"after {result.cycle_label(-1)}: "
+        yield Finding("limits", "limits", after + "; ".join(texts).replace("cycles", result.counted), values)
 
 
 def _chosen(result: Result, last: xr.Dataset, flat: int, why: str) -> tuple[xr.Dataset, str]:
@@ -196,9 +213,33 @@ def _nothing(result: Result, resonance: str) -> Finding:
         where = f"at {n_known} of {count(n_points, 'point')}, the worn volume of the others is not known"
     if not slip and result.has("friction_use"):
         used = float(result.of_points("friction_use", 0)[result.best_known].max())
-        where += f", with at most {show_percent(used)} of the friction that they can bear" if used > 0.0 else ""
+        if used > 1.0 - LEAST_ERROR:
+            where += ", of which some have come to rest at the limit of friction"
+        elif used > 0.0:
+            where += f", with at most {show_percent(used)} of the friction that they can bear"
     text = f"nothing wore{why} {where}" + (f" ({resonance})" if resonance else "")
-    return Finding("wear", "wear", text, {"worn_volume": 0.0, "largest_slip": slip, "friction_use": used})
+    values = {"worn_volume": 0.0, "largest_slip": slip, "friction_use": used}
+    if not slip and result.has("slip_amplitude", "excitation_amplitude"):
+        begins, said = _where_slip_begins(result)
+        text, values["slip_amplitude"] = text + said, begins
+    return Finding("wear", "wear", text, values)
+
+
+def _where_slip_begins(result: Result) -> tuple[float, str]:
+    """Excitation amplitude at which slip begins, N, as the point says that is nearest to it, and in words."""
+    slips = result.dataset["slip_amplitude"]
+    drawn = f"{DRAWN}excitation_amplitude"
+    amplitude = result.dataset[drawn if drawn in result.dataset else "excitation_amplitude"]
+    shares = (amplitude / slips.where(np.isfinite(slips))).transpose(*result.axes).values
+    shares = np.where(result.best_known & np.isfinite(shares), shares, 0.0)
+    nearest = result.largest(shares)
+    share = float(shares[result.place(nearest)])
+    if share == 0.0:
+        return math.nan, ""
+    begins = float(slips.values[result.place(nearest)])
+    where = result.describe(nearest, [name for name in result.varying if name not in _AFTER_THE_START])
+    text = f"; slip begins at about {show(begins, 'N')}" + (f" at {where}" if where else "")
+    return begins, f"{text}, extrapolated from {show(share * begins, 'N')}"
 
 
 def _response(result: Result, point: Point, wears: bool, resonance: str) -> Finding:

@@ -18,6 +18,7 @@ from solver.settings import FollowedFrequency, Resolution, ToTheEnd, WearTarget
 from studyrunner.kinds.results import deepest, describe_target, first_harmonic, named
 from studyrunner.kinds.task import Identity, Keep, PointResult, StartResult, Task, TaskJoint, Work, digest, up_or_down
 from studyrunner.kinds.wear.kind import OF_A_HISTORY, OWN_STEPS
+from studyrunner.kinds.wear.onset import slip_amplitude
 from studyrunner.mpi.dispatch import CostKeys
 from studyrunner.units import describe_reach
 
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
 _COST_AT_REST = 0.01  # estimated time of a history in which nothing wears, over that of a history with steps
 _NEIGHBOURS = 4  # frequencies whose histories take about as long
 _ROUND_OFF = 1e-10
+_NO_SLIP = 1e-12  # m, less than the size of an atom
 
 _digest_once = lru_cache(maxsize=16)(digest)
 
@@ -240,10 +242,12 @@ class History(_FromRest):
         for place in self.places:
             needed.setdefault(self.results[place][0], []).append(place)
         model, asked = self.joint.model(models), [self.asked(each, self.until) for each in needed]
-        histories = integrate_together(model, self.settings, unpack(self.start), asked, keep, self.resume, keep)
+        start = unpack(self.start)
+        histories = integrate_together(model, self.settings, start, asked, keep, self.resume, keep)
+        slips = slip_amplitude(start, model)
         for (each, places), history in zip(needed.items(), histories, strict=True):
             for place in places:
-                yield replace(build_result(self, each, history, self.results[place][1]), place=place)
+                yield replace(build_result(self, each, history, self.results[place][1], slips), place=place)
 
     def asked(self, integrated: Integrated, until: WearTarget | None) -> "WearRequest":
         """What the solver is asked for. until: wear at which the history ends."""
@@ -271,10 +275,13 @@ class History(_FromRest):
         return f"{self.excitation.at(self.frequency)} {self.results[place][0].scheme}"
 
 
-def build_result(task: History, integrated: Integrated, history: "WearHistory", place: int = 0) -> PointResult:
+def build_result(
+    task: History, integrated: Integrated, history: "WearHistory", place: int = 0, slips: float = math.nan
+) -> PointResult:
     """One history of a task at the output counts, with the variables that the task asks for.
 
-    integrated: the history that was integrated. place: number among those that are read from it.
+    integrated: the history that was integrated. place: number among those that are read from it. slips: amplitude of
+    the excitation at which the joint begins to slip, N.
 
     What is per cycle is per cycle of that history. What came after its last count has no part in it: jumps, errors, the
     end of the integrated history. Effort is that of the integrated history.
@@ -314,6 +321,7 @@ def build_result(task: History, integrated: Integrated, history: "WearHistory", 
         "error_estimate": last_error(
             history.cycles[known], history.worn_volume_error[known], history.wear_rate[known], last
         ),
+        "slip_amplitude": math.nan if not known.size or history.slip_range[0].max(initial=0.0) > _NO_SLIP else slips,
         "step_limit": history.step_limit / slower,
         "last_cycle": last,
         "largest_wear_depth": float(history.wear_depth[known].max(initial=0.0)) if known.size else math.nan,

@@ -86,7 +86,7 @@ FOLLOWED_FREQUENCY = ("excitation_frequency", "excitation_frequency_error")
 OF_EVOLUTION = ("dissipated_energy", "dissipated_energy_error", "pair_friction", "pair_stiffness")
 """Further ones of a study that names none and has [wear.evolution]."""
 
-OF_SAMPLES_ALONE = ("wear_depth_max", "wear_depth_max_error", "wear_depth_last")
+OF_SAMPLES_ALONE = ("wear_depth_last",)
 _SELDOM = (*OF_SAMPLES_ALONE, *FOLLOWED_FREQUENCY, *OF_EVOLUTION, "friction_power")
 USUAL = tuple(name for name in ASKED if name not in _SELDOM)
 """Those of other studies that name none."""
@@ -160,6 +160,12 @@ OF_A_HISTORY = {
     "branch": Variable((), "1", "number of folds that the sweep has jumped over since it began", dtype="int32"),
     "fold_frequency": Variable((), "Hz", "last fold at which the sweep left its solution branch", "NaN where none."),
     "step_limit": Variable((), "1", "largest stable explicit step at cycle 0, predicted, cycles", "inf where none."),
+    "slip_amplitude": Variable(
+        (),
+        "N",
+        "excitation amplitude at which the first pair slips in every period, or lifts",
+        "Extrapolated from the unworn state. NaN where a pair slips or lifts in it, inf if none ever does.",
+    ),
     "message": Variable((), "1", "further facts on how the point ended", dtype="U240"),
 }
 """Those that every result of wear histories holds."""

@@ -20,7 +20,7 @@ from solver.contact.wear_law import WearLaw
 from solver.settings import ToTheEnd
 from studyrunner.kinds.estimate import A_STATE, iterations_of_sweep, seconds_of
 from studyrunner.kinds.task import EQUAL_POINTS, TaskPlan, Work, n_unknowns_of
-from studyrunner.kinds.wear.allowable import HISTORIES_OF_SEARCH, AllowableAmplitude
+from studyrunner.kinds.wear.allowable import COST_OF_A_HISTORY, HISTORIES_OF_SEARCH, AllowableAmplitude
 from studyrunner.kinds.wear.histories import Excitation, History, Integrated, Sweep
 from studyrunner.kinds.wear.kind import ALLOWED, OWN_STEPS
 from studyrunner.points.table import Points
@@ -242,7 +242,8 @@ def _searches(study: Study, starts: _Starts, outputs: Mapping[str, Any]) -> Iter
             largest = depth if value.scheme == "explicit" else None
             integrated = Integrated(value.scheme, value.step, largest, (value.wear_coefficient,), unworn=False)
             iterations = _iterations([(value.scheme, value.step)], study.output_counts[-1])
-            cost = HISTORIES_OF_SEARCH * (sweep.cost * sweep.first_share + seconds_of(sweep.n_unknowns, iterations))
+            cost = sweep.cost * sweep.first_share + seconds_of(sweep.n_unknowns, iterations)
+            cost *= HISTORIES_OF_SEARCH * COST_OF_A_HISTORY
             own = {"cost": cost, "indices": (tuple(same),), "integrated": (integrated,)}
             yield AllowableAmplitude.of(_history(sweep, group, number=next(number), **own, **outputs))
 

@@ -1,12 +1,10 @@
-"""All points of a study at once: trends along its axes, what samples say, how points ended, how right they are."""
+"""All points of a study at once: trends along its axes, how points ended, how right they are."""
 
 import itertools
 import textwrap
-from collections.abc import Collection
 from typing import Any
 
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.colors import BoundaryNorm, ListedColormap
 from matplotlib.patches import Patch
@@ -16,11 +14,9 @@ from studyrunner.coordinates import POINT, SAMPLE
 from studyrunner.kinds.wear.kind import CERTIFICATE
 from studyrunner.report import drawing as plot
 from studyrunner.report.drawing import COLOURS, Drawn, FloatArray, Table, as_sentences
-from studyrunner.report.selection import choose, find_course, slow_time, spans_decades
+from studyrunner.report.selection import choose, find_course, spans_decades
 from studyrunner.result.opening import describe_outcome
-from studyrunner.result.view import NO_VOLUME, Result
-from studyrunner.statistics.sentences import describe_ranking, measure_of
-from studyrunner.system.progress import count
+from studyrunner.result.view import Result
 from studyrunner.units import Scale, scale_for, show_cycles, show_known, show_number, units_of
 
 _PLAIN = ("frequency", "scheme", SAMPLE, POINT)
@@ -28,16 +24,6 @@ _MOST_AXES, _SMALL = 6, 7.5
 _MOST_POINTS = 200  # in the table
 _LONG = 9  # characters that stand side by side under a small panel
 _MOST_ROWS, _MOST_CELLS, _LABEL_WIDTH = 24, 400, 20
-_MOST_PANELS, _MOST_LINES = 4, 3  # of samples
-_FAR = 3.0  # times what is worn: a limit above it is not drawn
-_LOWEST, _HIGHEST = 0, 1  # places along the dimension `bound`
-# quantiles between which a band lies, how dark it is, and what it is called
-_BANDS: tuple[tuple[int, int, float, str], ...] = ((0, 4, 0.18, "5 to 95 %"), (1, 3, 0.32, "25 to 75 %"))
-_MIDDLE = 2
-_EXCEEDED = (
-    ("worn_volume_exceedance", "exceeded_volume", "m3", "worn volume"),
-    ("wear_depth_exceedance", "exceeded_depth", "m", "largest wear depth"),
-)
 # what was computed to the end is light, so that what failed stands out
 _CONVERGED_COLOUR, _OTHERS = "#dfe7ef", (COLOURS[1], COLOURS[0], *COLOURS[2:], "#7f7f7f", "#F0E442")
 
@@ -144,156 +130,6 @@ def _draw_trend(panel: Axes, result: Result, name: str, values: FloatArray, erro
         panel.locator_params(axis="x", nbins=3)
 
 
-# --- what samples say ---
-
-
-def _ends(statistics: xr.Dataset, name: str, *dims: str) -> FloatArray:
-    """A statistic (dims..., 2): its lowest and its highest value."""
-    return np.asarray(statistics[name].transpose(*dims, "bound").values, dtype=float)
-
-
-def _largest(*values: FloatArray) -> float:
-    return max((float(each[np.isfinite(each)].max(initial=0.0)) for each in values), default=0.0)
-
-
-def _statistics(result: Result) -> xr.Dataset | None:
-    """What the samples say; None where a result has none, or nothing is worn."""
-    if SAMPLE not in result.varying or not result.has("worn_volume"):
-        return None
-    return result.statistics if float(result.dataset["worn_volume"].max()) > NO_VOLUME else None
-
-
-def _choose(
-    result: Result, statistics: xr.Dataset, free: Collection[str] = (), limit: int = _MOST_PANELS
-) -> tuple[list[xr.Dataset], list[str], str]:
-    """Statistics of combinations of the axes beside samples and `free`, their labels, a sentence on the others."""
-    choice = choose(result, [SAMPLE, *free], limit)
-    others = [name for name in result.axes if name not in free]
-    points = [statistics.isel({name: point[name] for name in others}, missing_dims="ignore") for point in choice.points]
-    return points, list(choice.labels), choice.sentence
-
-
-def draw_bands(result: Result, of: tuple[str, str]) -> Drawn:
-    """5, 25, 50, 75 and 95 % of the samples, and the limit. of: worn_volume or wear_depth, and over what: the "cycle",
-    or the "course" at the last count.
-    """
-    (quantity, over), statistics = of, _statistics(result)
-    name, course = f"{quantity}_quantile", find_course(result) if over == "course" else None
-    if (
-        statistics is None
-        or name not in statistics
-        or (statistics.sizes["cycle"] < 2 if over == "cycle" else course is None)
-    ):
-        return None
-    if course:
-        statistics = statistics.isel({"cycle": -1, course.axis: course.index})
-    axis = course.axis if course else "cycle"
-    shown, labels, left_out = _choose(result, statistics, [course.axis] if course else [])
-    cycles = scale_for(result.counted, statistics["cycle"].values.astype(float))
-    at = course.values if course else cycles(statistics["cycle"].values)
-    volumes = [_ends(point, name, axis, "quantile") for point in shown]
-    wrong = [_ends(point, f"{name}_error", axis, "quantile") for point in shown]
-    known = _largest(*(each[..., _LOWEST] for each in volumes))
-    scale = scale_for(units_of(statistics[name]), known)
-    limit = float(statistics.get(f"{quantity}_limit", np.nan))
-    limit = limit if limit < _FAR * known else np.nan
-    figure, panels = plot.panel_grid(labels, 3.0, sharex=True)
-    for panel, volume, error in zip(panels.flat, volumes, wrong, strict=True):
-        _draw_band(panel, at, volume, error, scale)
-        if np.isfinite(limit):
-            panel.plot(at, np.full(len(at), scale(limit)), color=COLOURS[1], label="limit")
-        panel.set(xlabel=slow_time(result, cycles), ylabel=scale.label(quantity.replace("_", " ")))
-        if course:
-            course.set_axis(panel)
-    plot.label_outer(panels)
-    panels[0, 0].set_xlim(at.min(), at.max())
-    # errors and what is open count to twice what is known
-    top = np.fmax(min(max(known, _largest(*wrong, *volumes)), 2.0 * known), limit)
-    plot.set_from_zero(panels[0, 0], scale(top).item())
-    n_without = max(int(point["n_without_value"].max()) for point in shown)
-    without = f"{count(n_without, 'sample')} without a value to be trusted leave open what they may be"
-    return figure, _n_samples(statistics), without if n_without else "", left_out
-
-
-def _n_samples(statistics: xr.Dataset) -> str:
-    confidence = 100.0 * float(statistics.attrs["confidence"])
-    return f"{count(int(statistics['n_samples']), 'sample')}, intervals of {confidence:g} % confidence"
-
-
-def _draw_band(panel: Axes, at: FloatArray, volume: FloatArray, wrong: FloatArray, scale: Scale) -> None:
-    """Bands and median along an axis: volume, and wrong with the numerical errors, (n, quantile, bound)."""
-    edges = np.where(np.isnan(wrong), volume, wrong)
-    edges = scale(np.minimum(edges, 10.0 * max(_largest(volume), 1e-30)))
-    for low, high, alpha, label in _BANDS:
-        lowest, highest = edges[:, low, _LOWEST], edges[:, high, _HIGHEST]
-        panel.fill_between(at, lowest, highest, color=COLOURS[0], alpha=alpha, lw=0.0, label=label)
-        for edge in (lowest, highest):
-            panel.plot(at, edge, color=COLOURS[0], lw=0.5, alpha=0.5, label=f"_{label}")
-    median, marker = scale(volume[:, _MIDDLE, _LOWEST]), "o" if at.size <= 12 else ""
-    panel.plot(at, median, color=COLOURS[0], marker=marker, label="median")
-
-
-def draw_exceedance(result: Result) -> Drawn:
-    """Probability of more than a volume, and of deeper than a depth, with its confidence band."""
-    statistics = _statistics(result)
-    if statistics is None:
-        return None
-    last = statistics.isel(cycle=-1)
-    shown, labels, left_out = _choose(result, last, limit=_MOST_LINES)
-    exceeded = [one for one in _EXCEEDED if one[0] in last]
-    figure, panels = plot.new_panels(1, len(exceeded), 3.2, sharey=True)
-    for panel, (name, dimension, units, words) in zip(panels[0], exceeded, strict=True):
-        scale = scale_for(units, last[dimension].values)
-        for number, (label, point) in enumerate(zip(labels, shown, strict=True)):
-            at, style = scale(point[dimension].values), plot.line_style(number)
-            value, interval = (_ends(point, f"{name}{each}", dimension) for each in ("", "_interval"))
-            if len(shown) == 1:
-                panel.fill_between(at, *interval.T, color=style["color"], alpha=0.18, lw=0.0)
-            else:
-                # bands on top of each other would be mud
-                panel.plot(at, interval, color=style["color"], linestyle=":", lw=0.8, label="_interval")
-            for bound in (_LOWEST, _HIGHEST) if (np.ptp(value, axis=1) > 0.0).any() else (_LOWEST,):
-                look = {name: style[name] for name in ("color", "linestyle")}
-                panel.plot(at, value[:, bound], **look, label="_" if bound else label or "samples")
-        panel.set(xlabel=scale.label(words), ylabel="probability of more", ylim=(0.0, 1.02))
-        panel.set_xlim(0.0, scale(last[dimension].values[-1]).item())
-    plot.label_outer(panels)
-    ends = "Thin dotted: ends of the intervals" if len(shown) > 1 else "Band: interval"
-    return figure, f"{ends}; {_n_samples(last)}", left_out
-
-
-def draw_deciding_inputs(result: Result) -> Drawn:
-    """What each input decides at the last cycle count: Sobol' indices, or rank correlations, with their intervals."""
-    statistics = _statistics(result)
-    if statistics is None or "input" not in statistics.dims:
-        return None
-    last = statistics.isel(cycle=-1)
-    measure = measure_of(last)
-    if measure is None or not last[measure].notnull().any():
-        return "The file holds too few samples to say what decides, or samples that do not differ: raise samples."
-    shares = measure == "first_index"
-    bars = {"first_index": "alone", "total_index": "with the others"} if shares else {measure: "rank correlation"}
-    shown, labels, left_out = _choose(result, last)
-    figure, panels = plot.panel_grid(labels, 2.9, sharex=True)
-    for panel, point in zip(panels.flat, shown, strict=True):
-        for place, (name, words) in enumerate(bars.items()):
-            value, interval = (_ends(point, f"{name}{each}", "input") for each in ("", "_interval"))
-            width = 0.72 / len(bars)
-            at, middle = np.arange(len(value)) + (place - 0.5 * (len(bars) - 1)) * 1.1 * width, value.mean(axis=1)
-            panel.bar(at, np.nan_to_num(middle), width, color=COLOURS[place])
-            panel.plot(at, middle, color=COLOURS[place], marker="s", linestyle="none", label=words)
-            sides = np.maximum(np.stack([middle - interval[:, _LOWEST], interval[:, _HIGHEST] - middle]), 0.0)
-            panel.errorbar(at, middle, yerr=np.nan_to_num(sides), fmt="none", ecolor="0.2", elinewidth=1.0, capsize=3.0)
-        panel.set_xticks(range(len(value)), [str(name).replace("_", "\n") for name in point["input"].values])
-        panel.set_ylim(0.0 if shares else -1.02, 1.02)
-        panel.set_ylabel("share of the variance" if shares else "rank correlation")
-        panel.grid(visible=False, axis="x")
-    plot.label_outer(panels)
-    rankings = [(label, describe_ranking(point)) for label, point in zip(labels, shown, strict=True)]
-    decides = (f"{label}: {text}" if label else text[0].upper() + text[1:] for label, text in rankings if text)
-    return figure, as_sentences(*decides), _n_samples(last), left_out
-
-
 # --- how far the points are to be trusted ---
 
 
@@ -308,7 +144,10 @@ def draw_outcomes(result: Result) -> Drawn:
     others = itertools.cycle(_OTHERS)
     cells = {number: _CONVERGED_COLOUR if number == Outcome.CONVERGED else next(others) for number in present}
     labels = [textwrap.fill(label, _LABEL_WIDTH) if plot.is_narrow() else label for label in choice.labels]
-    figure, panel = plot.new_panel(1.4 + 0.32 * len(field) + 0.15 * sum(label.count("\n") for label in labels))
+    height = 1.4 + 0.32 * len(field) + 0.17 * sum(label.count("\n") for label in labels)
+    figure, panel = plot.new_panel(height)
+    # a narrow figure is lower, its labels are not
+    figure.set_figheight(height)
     norm = BoundaryNorm([*(np.array(present) - 0.5), present[-1] + 0.5], len(present))
     look: dict[str, Any] = {"edgecolors": "white", "linewidth": 0.8} if field.size <= _MOST_CELLS else {}
     across, down = (np.arange(size + 1) - 0.5 for size in field.shape[::-1])
