@@ -111,7 +111,8 @@ def _overrides(result: Result) -> dict[str, Any]:
     keys: dict[str, Any] = {} if study.design is None else {"points": None}
     keys |= {f"axes.{axis.key[0]}": None for axis in study.scene_axes}
     # all of them: room for wear is made for the whole history
-    keys |= {f"scene.{key}": value for key, value in part.scene.parameters.model_dump(mode="json").items()}
+    parameters = part.scene.parameters.model_dump(mode="json").items()
+    keys |= {f"scene.{key}": value for key, value in parameters if key not in study.evolving}
     for name in (*study.kind.axes, *SOLVER_AXES):
         keys[f"axes.{name}"] = points.at(points.axis(name), shown)
     if study.allowable:
@@ -123,11 +124,14 @@ def _overrides(result: Result) -> dict[str, Any]:
             remedy = result.lacks("excitation_frequency")
             raise UserError(str(result.path), "excitation_frequency", None, remedy)
         keys["axes.frequency"] = float(result.at("excitation_frequency", shown, result.last_reached(shown)))
-    return keys | _ALONE
+    evolution = result.study.get("wear", {}).get("evolution")
+    return keys | _ALONE | ({"wear": {"evolution": evolution}} if evolution else {})
 
 
 def _depths(result: Result, shown: Mapping[str, int], last: int, *, only_last: bool = False) -> dict[str, Any]:
-    """The table `scene.worn` with the depths at the first count, where they are known, and at the last one."""
+    """The table `scene.worn` with the depths, and the energies of an evolving contact, at the first count, where they
+    are known, and at the last one.
+    """
     if not has_depths(result):
         raise UserError(str(result.path), "wear_depth", None, result.lacks("wear_depth"))
     depth = depths(result, shown)[:, pairs_of_scene(result, shown)]
@@ -135,9 +139,14 @@ def _depths(result: Result, shown: Mapping[str, int], last: int, *, only_last: b
         depth = depth + result.dataset["worn_depth"].isel(shown, missing_dims="ignore").values
     places = [last] if only_last or last == 0 or np.isnan(depth[0]).any() else [0, last]
     cycles = result.cycles[places]
+    whole = {"depth": depth}
+    if "evolution" in result.study.get("wear", {}):
+        if not result.has("dissipated_energy"):
+            raise UserError(str(result.path), "dissipated_energy", None, result.lacks("dissipated_energy"))
+        whole["energy"] = result.at("dissipated_energy", shown).values[:, pairs_of_scene(result, shown)]
     if not np.isfinite(cycles).all():
-        return {"depth": [depth[last].tolist()]}
-    return {"depth": depth[places].tolist(), "cycle": cycles.tolist()}
+        return {name: [each[last].tolist()] for name, each in whole.items()}
+    return {**{name: each[places].tolist() for name, each in whole.items()}, "cycle": cycles.tolist()}
 
 
 def _run(result: Result, overrides: Mapping[str, object], output: Path, progress: bool) -> xr.Dataset:

@@ -140,6 +140,9 @@ def contact_changes(
             if own.scene.worn is not None:
                 # wear opens a pair as a gap does, Eq. (7)
                 drawn = {**drawn, "gap": drawn.get("gap", scene.contact.gap) + worn_depth(own, scene)}
+                if own.evolving:
+                    energy = own.scene.worn.of_pairs(own.scene.worn.energy[0], len(drawn["gap"]))
+                    drawn = {**drawn, "energy": np.array(energy)}
             changes.append(tuple((name, tuple(each.tolist())) for name, each in drawn.items()))
         of_blocks.append(changes)
     return tuple(zip(*of_blocks, strict=True))

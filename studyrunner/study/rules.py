@@ -113,7 +113,11 @@ def _solver_and_end(study: Study) -> Iterator[Wrong]:
 
 
 def _evolution(study: Study) -> Iterator[Wrong]:
-    """What changes with the dissipated energy is given once."""
+    """What changes with the dissipated energy is given once, and a worn joint has dissipated some."""
+    worn = study.scene.worn
+    if study.evolving and worn is not None and not worn.energy:
+        remedy = "missing: give it, J/m2, beside depth, or a result with dissipated_energy among its variables"
+        yield Wrong("scene.worn.energy", None, remedy)
     for name in study.evolving.keys() & {"friction_coefficient", "contact_stiffness"}:
         remedy = f"leave it out: the first numbers of wear.evolution.{name} are those of the unworn joint"
         given = dict(study.scene.parameters).get(name)

@@ -35,12 +35,16 @@ _Depths = Annotated[tuple[NotNegative, ...], Field(min_length=1, strict=False)]
 class Worn(Section):
     """Worn states of a joint.
 
-    depth: of each state, m, of each pair, or one number for all pairs. cycle: cycle count of each state; empty where
-    the depths are given. result: file that the depths are from.
+    depth: of each state, m, of each pair, or one number for all pairs. energy: that friction has dissipated, J/m2, in
+    the same way; () where it is not known. cycle: cycle count of each state; empty where the depths are given. result:
+    file that the depths are from.
     """
 
     depth: Annotated[tuple[_Depths, ...], BeforeValidator(_states)] = Field(
         description="m, of each pair or of all pairs"
+    )
+    energy: Annotated[tuple[_Depths, ...], BeforeValidator(_states)] = Field(
+        (), description="J/m2, dissipated before, of each pair or of all pairs: for [wear.evolution]"
     )
     cycle: Axis[NotNegative] = Field((), description="cycle counts of the result")
     result: str = Field("", description="result file")
@@ -51,17 +55,27 @@ class Worn(Section):
             found = Verbatim(f"{counted(len(self.depth), 'state')} with {counted(len(self.cycle), 'cycle count')}")
             remedy = "give one cycle count in scene.worn.cycle for each state, or one state without a count"
             yield Wrong("depth", found, remedy)
+        if self.energy and [*map(len, self.energy)] != [*map(len, self.depth)]:
+            yield Wrong("energy", None, "give as many numbers as depths, for as many states")
 
     def states(self) -> tuple["Worn", ...]:
         """Each state alone, without its count."""
-        return tuple(self.model_copy(update={"depth": (each,), "cycle": ()}) for each in self.depth)
+        energies = self.energy or ((),) * len(self.depth)
+        states = zip(self.depth, energies, strict=True)
+        return tuple(
+            self.model_copy(update={"depth": (depth,), "energy": (energy,) if energy else (), "cycle": ()})
+            for depth, energy in states
+        )
 
     def depths(self, n_contact: int) -> tuple[float, ...]:
-        """Depths (n_contact,), m, of the only state.
+        """Depths (n_contact,), m, of the only state, as `of_pairs`."""
+        return self.of_pairs(self.depth[0], n_contact)
 
-        Raises Wrong where there are others than pairs; one depth is of all pairs, but not one of a result.
+    def of_pairs(self, depth: tuple[float, ...], n_contact: int) -> tuple[float, ...]:
+        """Numbers (n_contact,) of a state.
+
+        Raises Wrong where there are others than pairs; one number is of all pairs, but not one of a result.
         """
-        (depth,) = self.depth
         if len(depth) == n_contact:
             return depth
         if len(depth) == 1 and not self.result:
@@ -157,15 +171,18 @@ def read_worn(table: object, source: str, folder: Path) -> Worn:
     path = folder / given.result
     check_result_file(path, str(path))
     with result_errors(str(path)), xr.open_dataset(path.absolute(), engine="netcdf4", decode_times=False) as dataset:
-        depth = _depths_in(dataset, given.model_extra or {}, given.cycle, source)
-        return Worn(depth=depth.tolist(), cycle=given.cycle, result=given.result)
+        of_point = given.model_extra or {}, given.cycle, source
+        found = {"depth": _worn_in(dataset, "wear_depth", *of_point).tolist()}
+        if "dissipated_energy" in dataset:
+            found["energy"] = _worn_in(dataset, "dissipated_energy", *of_point).tolist()
+        return Worn(**found, cycle=given.cycle, result=given.result)
 
 
-def _depths_in(dataset: "xr.Dataset", point: Mapping[str, object], cycle: Sequence[float], source: str) -> Any:
-    """Depths (n_states, n_contact), m, of a point of a result at cycle counts."""
-    if "wear_depth" not in dataset:
-        raise UserError(source, "scene.worn.result", None, "give a result with wear_depth among its variables")
-    depths = dataset["wear_depth"]
+def _worn_in(dataset: "xr.Dataset", name: str, point: Mapping[str, object], cycle: Sequence[float], source: str) -> Any:
+    """Depths, m, or energies, J/m2 (n_states, n_contact), of a point of a result at cycle counts."""
+    if name not in dataset:
+        raise UserError(source, "scene.worn.result", None, f"give a result with {name} among its variables")
+    depths = dataset[name]
     if "cycle" not in depths.dims:
         raise UserError(source, "scene.worn.result", None, "give a result of wear histories: missions have no cycles")
     axes = [str(name) for name in depths.dims[:-2]]

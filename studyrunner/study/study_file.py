@@ -219,6 +219,7 @@ def format_study(study: Study) -> str:
     names = {axis.key[0] for axis in study.scene_axes}
     own, others = dict(study.scene.parameters), [dict(each.scene.parameters) for each in study.variants]
     chosen = {key for key in own if key not in names and any(other[key] != own[key] for other in others)}
+    chosen |= {*study.evolving}  # whose first numbers stand there
     kept = {key: value for key, value in tables["scene"]["parameters"].items() if key not in chosen}
     tables["scene"] = {"model": study.scene.model, **kept, "worn": _worn_states(study)}
     used = {*study.own_axes, *study.kind.last_axes, *study.kind.other_axes}
@@ -275,5 +276,7 @@ def _worn_states(study: Study) -> dict[str, object] | None:
     counts = [count for axis in study.scene_axes if axis.is_worn for count in axis.values]
     # the axis of worn states is the last one
     variants = study.variants[: len(counts)] if counts else (study,)
-    depths = [list(each.scene.worn.depth[0]) for each in variants if each.scene.worn]
-    return {"cycle": counts, "depth": depths, "result": worn.result} if counts else {"depth": depths}
+    states = [each.scene.worn for each in variants if each.scene.worn]
+    found: dict[str, object] = {"depth": [list(each.depth[0]) for each in states]}
+    found |= {"energy": [list(each.energy[0]) for each in states]} if worn.energy else {}
+    return {"cycle": counts, **found, "result": worn.result} if counts else found

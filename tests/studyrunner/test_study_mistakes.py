@@ -60,6 +60,16 @@ WRONG = {
         wear.law=threshold -> wear.threshold
         wear={{law='table', pressure=[0], depth=[0], factor=[[1]]}} ; scene.worn={{depth=1e-6}} -> wear.law
         wear.threshold=1.0
+        wear.evolution={{energy=[0, 1e5]}} -> wear.evolution
+        wear.evolution={{energy=[1, 1e5], wear_factor=[1, 2]}} -> wear.evolution.energy = 1.0
+        wear.evolution={{energy=[0, 1e5, 1e4], wear_factor=[1, 2, 3]}} -> wear.evolution.energy
+        wear.evolution={{energy=[0, 1e5], wear_factor=[1, 2, 3]}} -> wear.evolution.wear_factor
+        wear.evolution={{energy=[0, 1e5], contact_stiffness=[1e13, 5e12]}} \
+            -> wear.evolution.contact_stiffness = 5000000000000.0
+        scene.friction_coefficient=0.4 ; wear.evolution={{energy=[0, 1e5], friction_coefficient=[0.3, 0.5]}} \
+            -> scene.friction_coefficient
+        wear.evolution={{energy=[0, 1e5], wear_factor=[1, 2]}} ; scene.worn={{depth=1e-6}} -> scene.worn.energy
+        wear.evolution={{energy=[0, 1e5], wear_factor={{nosuch=[1, 2]}}}} -> wear.evolution.wear_factor
         outputs.variables=['wear'] -> outputs.variables = "wear"
         outputs.variables=['mesh']
         outputs.variables=['natural_frequency']

@@ -1,5 +1,7 @@
 """Wear histories from the study file to the result: laws, targets, the end of wear, a followed frequency, shortcuts."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -46,6 +48,41 @@ def test_the_law_of_a_study_is_the_one_that_wears():
     power, half = ("wear.law=power", "wear.adhesive=2e-12", "wear.decay=1e-3"), "axes.wear_coefficient=5.5e-12"
     both = final(*power, "axes.wear_coefficient=[1.1e-11, 5.5e-12]")
     assert both[1] == final(*power, half)[0] > 0.6 * both[0]
+
+
+EVOLVING = """
+[study]
+name = "evolving"
+[scene]
+model = "sdof_slider"
+[axes]
+frequency = 160
+excitation_amplitude = 10
+wear_coefficient = [1e-12, 1e-30]
+[wear.evolution]
+energy = [0, 1e5]
+friction_coefficient = [0.3, 0.5]
+[slow_time]
+cycles = 20000
+outputs = 3
+"""
+
+
+def test_a_contact_evolves_on_from_where_a_result_has_left_it():
+    """As one history: a joint that is mounted worn begins with its depths and its energies, archived or not."""
+    Path("evolving.toml").write_text(EVOLVING)
+    whole = compute("evolving.toml", "out.nc")
+    assert {"dissipated_energy", "dissipated_energy_error", "pair_friction"} <= set(whole.data_vars)
+    assert not np.isfinite(whole.pair_stiffness).any()
+    friction, energy = (whole[name].values[..., 0].reshape(2, 3) for name in ("pair_friction", "dissipated_energy"))
+    assert friction == pytest.approx(np.interp(energy, [0.0, 1e5], [0.3, 0.5]), rel=1e-12)
+    # nothing wears with the second coefficient, and friction changes all the same
+    assert energy[:, 1].min() > 1e3
+    worn = "scene.worn={result='out.nc', cycle=10000, wear_coefficient=1e-12}"
+    rest = "axes.wear_coefficient=1e-12", worn, "slow_time.cycles=10000", "slow_time.outputs=2"
+    later = compute("evolving.toml", "later.nc", *rest)
+    assert later.pair_friction.values.ravel() == pytest.approx(friction[0, 1:], rel=2e-3)
+    assert read_study("later.nc").evolving == read_study("out.nc").evolving
 
 
 # --- where slip begins ---
