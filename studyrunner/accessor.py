@@ -36,7 +36,7 @@ def _widened(dataset: xr.Dataset, name: str, variables: Sequence[str]) -> xr.Dat
     is lost.
     """
     needed = [each for each in variables if each in dataset and name not in dataset[each].dims]
-    if not needed:
+    if not needed or dataset.sizes.get(name, 1) > 1:
         return dataset
     if name not in dataset.coords:
         raise ValueError(f"The dataset has lost its {name}: select or squeeze it without drop=True.")
