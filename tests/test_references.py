@@ -104,7 +104,7 @@ def test_wear_of_a_slider_follows_its_differential_equation():
     # the mount of the closing displacement is massless
     for part in (np.full(1, 0.0), np.full(1, 1e-9)):
         assert in_time.at_rest(model, structure, part).force[0] == pytest.approx(10.0 - 1e5 * part[0], rel=1e-6)
-    *_, (cycle, depth, _) = in_time.wear(model, structure, motion, 1.1e-11, 600.0, 1e5)
+    *_, (cycle, depth, _, _) = in_time.wear(model, structure, motion, 1.1e-11, 600.0, 1e5)
     exact = references.slider_wear_depth(
         [0.0, 1e5], lambda limit: references.slider_amplitude(MASS, 8.0, STIFFNESS, FORCE, limit, OMEGA)
     )

@@ -30,6 +30,7 @@ SMALL = {
     " slow_time.outputs=3 solver.harmonics=3 solver.samples=64",
     "mission": "slow_time.missions=1 slow_time.outputs=2 solver.harmonics=3 solver.samples=64",
     "modes": "axes.modal_amplitude=[1e-4,2e-4]",
+    "running_in": "slow_time.cycles=20000 slow_time.outputs=[0,2000,5000,20000] solver.harmonics=3 solver.samples=64",
     "scatter": "scatter.samples=2 scene.mesh=1 axes.frequency=212.45 slow_time.cycles=3000 slow_time.outputs=3"
     " solver.harmonics=3 solver.samples=64",
     "sdof_slider": "axes.frequency=160.0 slow_time.cycles=4000 slow_time.outputs=5",
@@ -48,6 +49,11 @@ def wears_near_its_resonance_only(result):
     beside, near = worn.sel(frequency=207.0), worn.sel(frequency=212.5)
     assert (near > 1e-12).all()
     assert (beside < 1e-6 * near).all()
+
+
+def rises_first_and_falls_later(result):
+    first, *_, highest, last = result.excitation_frequency.values.ravel()
+    assert first < last < highest - 0.1
 
 
 def has_two_branches(result):
@@ -99,6 +105,7 @@ SHOWN = {
     "mission": wears_in_run_up_and_dwells,
     "modes": resonates_lower_the_more_it_is_worn,
     "dovetail": wears_near_its_resonance_only,
+    "running_in": rises_first_and_falls_later,
     "damper": resonates_between_a_free_and_a_stuck_wedge,
     "shrouded": resonates_at_each_nodal_diameter,
     "vibro_impact": has_two_branches,
