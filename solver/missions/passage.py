@@ -257,7 +257,7 @@ def delay_of(given: BlockInput, states: Sequence[SweptState]) -> tuple[float, fl
     """
     largest = max(states, key=lambda state: float(np.abs(state.response).max())).start.state
     assert largest is not None
-    model, closed = given.block.model, largest.contact_force_h[:, 0, 0] > 0.0
+    model, closed = given.model, largest.contact_force_h[:, 0, 0] > 0.0
     joints = ((closed, True), (closed, False), (np.zeros_like(closed), False))
     modes = (linear_mode(model, held, sticking=sticking, near=largest.omega) for held, sticking in joints)
     mode = next((found for found in modes if found is not None), None)

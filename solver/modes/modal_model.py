@@ -16,6 +16,7 @@ from typing import cast
 import numpy as np
 import scipy.linalg
 
+from solver.compliant_contact import stiffened
 from solver.model import BoolArray, LinearModel, Matrix, ReducedModel
 from solver.settings import NEGLIGIBLE
 from solver.structure.condensation import regular
@@ -41,7 +42,9 @@ def linear_mode(
     Pairs with a law of another kind have its stiffness at rest.
     number: from 1 on in ascending frequency. near: rad/s; the mode nearest to a frequency instead.
     """
-    linear, dofs, closed = model.harmonic_structure(1), model.contact.dofs, closed & model.contact.rubs
+    # the springs of a worn contact as they are
+    linear = stiffened(model, model.contact).harmonic_structure(1)
+    dofs, closed = model.contact.dofs, closed & model.contact.rubs
     springs = np.zeros(len(linear.mass))
     springs[model.contact.relative] = model.contact.rest_stiffness[dofs >= 0]
     stuck = closed & (model.contact.friction > 0.0) if sticking else np.zeros_like(closed)

@@ -130,7 +130,8 @@ def _rate_changes(wearing: WearingJoint, state: WearState, depths: FloatArray, *
     """Changes dg (k, n_contact), m per cycle, of the wear rates of a state with changes of the depths, m, as exact as a
     Newton direction. fixed_factors: whether the factors of a table keep their values.
     """
-    joint, at, gain = wearing.joint_of(state), state.at, wearing.gain(1.0)
+    joint, at = wearing.joint_of(state), state.at
+    gain = wearing.gain(1.0) * joint.contact.wear_factor[0]
     force_tangent, work_tangent, _ = joint.law.tangent(at)
     by_work, by_force, by_depth = (gain * part for part in wearing.wearing_work(state).slopes(*worn_by(at)))
     growth = by_work[:, None] * work_tangent + by_force[:, None] * force_tangent[:, 0]

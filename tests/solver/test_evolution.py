@@ -12,6 +12,7 @@ from solver.accuracy.certificate import certify
 from solver.contact.wear_law import WearLaw, WearTable
 from solver.harmonic_balance.state import first_response
 from solver.model import with_friction
+from solver.modes.modal_model import linear_mode
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.results.state_report import evaluated
@@ -247,3 +248,13 @@ def test_missions_dissipate_as_the_cycles_of_their_blocks():
     assert found.steps.size < 200
     assert found.dissipated_energy[:, 0] == pytest.approx(exact, rel=2e-4)
     assert (np.abs(found.dissipated_energy[:, 0] - exact) <= found.dissipated_energy_error[:, 0] + 1e-4 * exact).all()
+
+
+def test_a_linear_mode_of_a_worn_joint_has_its_springs():
+    model, closed = dovetail(5), np.ones(16, bool)
+    evolving = with_evolution(model, [0.0, 1e6], friction_coefficient=[0.5, 0.5], contact_stiffness=[2e13, 8e13])
+    worn = replace(evolving, contact=evolving.contact.after(np.full(16, 0.5e6)))
+    stiff = with_friction(with_contact_stiffness(model, 5e13), 0.5)
+    modes = [linear_mode(each, closed) for each in (worn, stiff, evolving)]
+    assert modes[0].omega == pytest.approx(modes[1].omega, rel=1e-9)
+    assert modes[0].omega > 1.0001 * modes[2].omega
