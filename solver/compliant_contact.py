@@ -86,6 +86,7 @@ def with_evolution(
     act in the balance of the same step on the slow time scale. Between the energies the properties are linear, beyond
     the last one constant. The friction coefficient of functions such as `march_wear` is then None.
 
+    model: without a contact stiffness of its own where one is given here.
     energy (k,): J/m2, ascending from 0. friction_coefficient, contact_stiffness, N/m3, wear_factor, times the wear
     coefficient: (k,) for all pairs, or (n_contact, k); at least one of them. The unworn joint has the first ones.
     Raises ValueError where a table does not ascend or fit, a value is out of its range, or the model has it already.
@@ -96,6 +97,7 @@ def with_evolution(
     tables = {"friction_coefficient": friction_coefficient, "contact_stiffness": contact_stiffness}
     tables["wear_factor"] = wear_factor
     most = {"friction_coefficient": LARGEST_FRICTION, "contact_stiffness": LARGEST_CONTACT_STIFFNESS}
+    check("evolution", model.contact.evolution is None, "the model has one already")
     check("evolution", any(each is not None for each in tables.values()), "give " + ", ".join(tables))
     whole: dict[str, FloatArray | None] = dict.fromkeys(tables)
     for name, given in tables.items():
@@ -104,7 +106,8 @@ def with_evolution(
         table = np.asarray(given, np.float64)
         check(name, table.shape in ((at.size,), (n_contact, at.size)), f"give {at.size} numbers, one for each energy")
         limit = most.get(name, np.inf)
-        check(name, bool(((table > 0.0) & (table <= limit)).all()), f"give numbers above 0, at most {limit:g}")
+        right = bool(((table > 0.0) & (table <= limit) & np.isfinite(table)).all())
+        check(name, right, f"give numbers above 0, at most {limit:g}")
         whole[name] = np.array(np.broadcast_to(table, (n_contact, at.size)))
     stiffness, friction = whole["contact_stiffness"], whole["friction_coefficient"]
     if stiffness is not None:

@@ -163,7 +163,7 @@ class ContactInterface(_ByRows):
 
     @cached_property
     def wear_factor(self) -> tuple[FloatArray, FloatArray]:
-        """Wear coefficient over that of the unworn joint (n_contact,), and its change with the energy, m2/J."""
+        """Wear coefficient over that of the history (n_contact,), and its change with the energy, m2/J."""
         found = self.evolution and self.evolution.now("wear_factor")
         return found or (np.ones(self.n_contact), np.zeros(self.n_contact))
 

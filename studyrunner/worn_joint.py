@@ -15,6 +15,7 @@ from studyrunner.api import run_study
 from studyrunner.points.table import points_of
 from studyrunner.result.pairs import depths, has_depths, pairs_of_scene
 from studyrunner.result.view import NO_VOLUME, Result, open_for_report
+from studyrunner.study.scene_section import WORN_AXIS
 from studyrunner.study.sections import SOLVER_AXES
 from studyrunner.study.study_file import read_study
 from studyrunner.user_error import UserError
@@ -143,7 +144,11 @@ def _depths(result: Result, shown: Mapping[str, int], last: int, *, only_last: b
     if "evolution" in result.study.get("wear", {}):
         if not result.has("dissipated_energy"):
             raise UserError(str(result.path), "dissipated_energy", None, result.lacks("dissipated_energy"))
-        whole["energy"] = result.at("dissipated_energy", shown).values[:, pairs_of_scene(result, shown)]
+        energy = result.at("dissipated_energy", shown).values[:, pairs_of_scene(result, shown)]
+        scene: Any = result.study["scene"]
+        states = (scene.get("worn") or {}).get("energy")
+        before = states[shown.get(WORN_AXIS, 0)] if states else 0.0
+        whole["energy"] = energy + np.array(before)
     if not np.isfinite(cycles).all():
         return {name: [each[last].tolist()] for name, each in whole.items()}
     return {**{name: each[places].tolist() for name, each in whole.items()}, "cycle": cycles.tolist()}

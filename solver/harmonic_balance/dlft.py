@@ -30,8 +30,8 @@ from solver.packing import packable
 from solver.settings import NEGLIGIBLE
 from solver.structure.joint import Joint
 
-MOST_MARCHES = 12
-SAME_FRICTION = 1e-13
+MOST_MARCHES = 20
+SAME_FRICTION = 1e-12
 """Most marches until the friction of an evolving contact agrees with the energy that it dissipates, and by how much.
 Four are usual."""
 
@@ -111,7 +111,7 @@ class Balance:
                 rise = np.divide(after - last[1], moved, out=rise, where=moved != 0.0)
             last, energy = (energy, after), energy + (after - energy) / np.where(rise < 0.9, 1.0 - rise, 1.0)
         # no state: the residual is not known
-        return found, marched, np.full_like(after, np.nan)
+        return found, replace(marched, force_h=np.full_like(marched.force_h, np.nan)), after
 
     def _law(self, contact: ContactInterface) -> tuple[Element, FloatArray | None]:
         """The law with the friction of a contact, and the predicted force before (n_contact, 3, N), with friction discs
@@ -205,7 +205,8 @@ class Linearisation:
     growth_tangent, energy_tangent (n_contact, 3m): derivatives of the wear depth, m/N, which is a part of the static
     normal motion, and of the dissipated energy, 1/m2. flexibility (n_contact, 3): motion of the structure over contact
     force, m/N, beside that of the contact; eased (n_contact, 3m): that motion over the dissipated energy, m3/J.
-    Columns of pairs that stick during the whole period are those of the identity: only `active` pairs are coupled.
+    Columns of pairs that stick during the whole period, without flexibility, are those of the identity: only `active`
+    pairs are coupled.
     """
 
     joint: Joint

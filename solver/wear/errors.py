@@ -115,7 +115,9 @@ def history_error(outputs: Compared, steps: Compared, area: FloatArray) -> Histo
     n_equal = np.divide(volume**2, squares, out=np.ones_like(squares), where=squares > 0.0)
     of_pair = np.minimum(PAIR_OVER_VOLUME, np.sqrt(n_equal)) * _over(error, volume)
     of_pairs = np.maximum(of_pairs, absolute(of_pair[:, None], depth))
-    heat = np.maximum(heat, absolute(of_pair[:, None], values["dissipated_energy"]))
+    # also where nothing wears: the wear rate is known as the slip is
+    of_heat = np.maximum(of_pair, values["wear_rate_error"][0])
+    heat = np.maximum(heat, absolute(of_heat[:, None], values["dissipated_energy"]))
     response = np.maximum(response, _change_within(volume, error, steps, area))
     frequency = _frequency_error(outputs, DIFFERENCE_SAFETY, np.zeros_like(volume))
     return _completed(outputs, HistoryError(error, of_pairs, heat, response, wear_rate, frequency), area)

@@ -49,7 +49,10 @@ def _with_hold(wearing: WearingJoint, state: WearState, worn: FloatArray, *, dri
     point = wearing.run.state(Balance(joint, state.point.next_history, worn[0], energy=worn[1]), state.at.predicted_h)
     if point is None or not wearing.run.is_stable(joint, point.evaluation):
         return None
-    if creeps(joint, hold, point.evaluation) or vibration_change(state.at, point.evaluation) > OTHER_BRANCH:
+    if (
+        creeps(joint.after(point.evaluation.energy), hold, point.evaluation)
+        or vibration_change(state.at, point.evaluation) > OTHER_BRANCH
+    ):
         return None
     # without a factorisation of the joint without a hold
     wearing.run = wearing.run.fresh()

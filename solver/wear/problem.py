@@ -93,8 +93,10 @@ class WearProblem(WearingJoint):
         elif (failure := self._gives_up(state, course)) is not None:
             return failure
         elif not self.wears(state):
-            # the state holds for all later counts
-            return state, course.after(replace(course.nodes[-1], count=self.request.end))
+            # the state holds for all later counts, and its friction dissipates on
+            last, count = course.nodes[-1], self.request.end
+            energy = last.energy + (count - last.count) * last.energy_rate
+            return state, course.after(replace(last, count=count, energy=energy))
         else:
             end, local = self.step(state), course.nodes[-1].values["local"]
         if isinstance(end, Failure):
@@ -132,7 +134,8 @@ class WearProblem(WearingJoint):
         if isinstance(cycles, ToTheEnd):
             largest = state.record.largest_rates[:-1]
             least = cycles.final_share * np.maximum(largest, cycles.final_share * float(largest.max(initial=0.0)))
-            if not self.wears(state) or (state.rate * self.area <= least).all():
+            fades = bool((state.rate * self.area <= least).all()) and self.change_rate(state) == 0.0
+            if not self.wears(state) or fades:
                 return True
         return not math.isnan(course.reached) or course.ends[-1] >= self.request.end * (1.0 - 1e-12)
 
@@ -171,7 +174,8 @@ class WearProblem(WearingJoint):
         if steps is not None:
             length = steps.length
             if steps.depth is not None:
-                length = steps.depth / float(state.rate.max())
+                fastest = float(state.rate.max())
+                length = steps.depth / fastest if fastest > 0.0 else math.inf
             elif self.limit == math.inf:
                 length *= float(state.record.largest_rates[-1] / self.volume_rate(state))
             else:

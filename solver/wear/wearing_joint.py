@@ -239,7 +239,8 @@ class WearingJoint:
         rate = self.gain(1.0) * contact.wear_factor[0] * wearing.work(*worn_by(state.at))
         energy_rate = friction_limit(contact.friction, state.at.slip_work) / self.area
         slip = slip_at_most(state.at)
-        most = max(state.record.most_rate, self.request.wear_coefficient * (wearing.largest_factor * slip))
+        most = self.request.wear_coefficient * (wearing.largest_factor * slip) * float(contact.wear_factor[0].max())
+        most = max(state.record.most_rate, most)
         rates = rate * self.area
         largest = np.maximum(state.record.largest_rates, np.abs(np.append(rates, rates.sum())))
         record = replace(state.record, largest_rates=largest, most_rate=most)

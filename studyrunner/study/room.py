@@ -58,8 +58,10 @@ def expected_wear(study: Study) -> ExpectedWear:
 
     law, until = study.wear.as_law, study.slow_time.until or {}
     factor = sum(largest(f"surfaces_{label}", value) for label, value in law.surfaces) if law.surfaces else 1.0
+    most = {name: max(map(max, tables.values())) for name, tables in study.evolving.items()}
     if law.name in ("energy", "power"):
-        factor *= study.friction_coefficient or 0.0
+        factor *= most.get("friction_coefficient", study.friction_coefficient or 0.0)
+    factor *= max(most.get("wear_factor", 1.0), 1.0)
     if isinstance(law.table, WearTable):
         factor *= max(max(row) for row in law.table.factor)
     cycles = math.inf if study.to_the_end else study.output_counts[-1]

@@ -19,6 +19,8 @@ from solver.results.state_report import evaluated
 from solver.settings import SolverSettings
 from solver.stability.floquet import find_multipliers
 from solver.structure.joint import build_case
+from solver.wear.step import rate_slope
+from solver.wear.wearing_joint import WearingJoint, WearRequest
 from tests.references import slider_amplitude
 from tests.solver.models import (
     OMEGA,
@@ -258,3 +260,45 @@ def test_a_linear_mode_of_a_worn_joint_has_its_springs():
     modes = [linear_mode(each, closed) for each in (worn, stiff, evolving)]
     assert modes[0].omega == pytest.approx(modes[1].omega, rel=1e-9)
     assert modes[0].omega > 1.0001 * modes[2].omega
+
+
+def test_friction_that_wears_nothing_dissipates_all_the_same():
+    """Without wear the state holds, and its energy grows evenly."""
+    model, omega = driven([0.0, 1e3], friction_coefficient=[0.3, 0.3])
+    found = history(model, omega, wear=0.0)
+    assert found.dissipated_energy[:, 0] == pytest.approx(0.3 * PER_CYCLE * COUNTS, rel=1e-4)
+    assert not found.wear_depth.any()
+
+
+def test_the_slope_of_a_wear_rate_has_its_factor():
+    omega, energy = 2.0 * np.pi * 160.0, [0.0, 1e6]
+    settings = SolverSettings(harmonics=5, samples=64)
+    slopes = []
+    for model, friction in (
+        (with_evolution(scene("sdof_slider", 5), energy, wear_factor=[3.0, 3.0]), 0.5),
+        (scene("sdof_slider", 5), 0.5),
+    ):
+        (start,) = branch_states(model, friction, 10.0, [omega], settings)
+        model = with_friction(model, friction)
+        case = build_case(model, start.penalty_omega, settings, start.resolution)
+        wearing = WearingJoint(case, start, WearRequest(1e-11, None, COUNTS))
+        slopes.append(float(rate_slope(wearing, wearing.unworn_state(), np.ones(1, bool))[0, 0]))
+    assert slopes[0] == pytest.approx(3.0 * slopes[1], rel=1e-9)
+
+
+def test_what_cannot_evolve_is_refused():
+    model = scene("sdof_slider", 3)
+    for tables, name in (
+        ({}, "evolution"),
+        ({"wear_factor": [1.0, np.inf]}, "wear_factor"),
+        ({"friction_coefficient": [0.3, 2.5]}, "friction_coefficient"),
+        ({"contact_stiffness": [2e13, 1e13]}, "contact_stiffness"),
+        ({"wear_factor": [1.0, 2.0, 3.0]}, "wear_factor"),
+    ):
+        with pytest.raises(ValueError, match=name):
+            with_evolution(model, [0.0, 1.0], **tables)
+    for energy in ([1.0, 2.0], [0.0], [0.0, 0.0]):
+        with pytest.raises(ValueError, match="energy"):
+            with_evolution(model, energy, wear_factor=[1.0] * len(energy))
+    with pytest.raises(ValueError, match="already"):
+        with_evolution(with_evolution(model, [0.0, 1.0], wear_factor=[1.0, 2.0]), [0.0, 1.0], wear_factor=[1.0, 2.0])

@@ -328,6 +328,11 @@ def build_result(
         "message": message or (describe_target(task.until, target, "cycle", whole=whole) if known.size else ""),
     }
     values = _at_counts(history, task.variables, slower, rows, reached) | named(tuple(OF_A_HISTORY), own, history)
+    if integrated.unworn and "dissipated_energy" in values:
+        # its state at cycle 0 is that of all cycles
+        in_cycle = history.friction_power[0] / history.excitation_frequency[0]
+        values["dissipated_energy"] = np.outer(task.cycles, in_cycle)
+        values["dissipated_energy_error"] = values["dissipated_energy"] * history.wear_rate_error[0]
     return PointResult(values, place)
 
 
@@ -338,8 +343,7 @@ def _at_counts(
 
     slower: wear coefficient over that of the history.
     """
-    with np.errstate(divide="ignore", invalid="ignore"):
-        # of an unworn joint, whose state at cycle 0 is that of all counts, no energy is known
+    with np.errstate(divide="ignore", invalid="ignore"):  # of an unworn joint: `build_result`
         energies = {name: getattr(history, name) / slower for name in ("dissipated_energy", "dissipated_energy_error")}
     own = {
         **first_harmonic(history.response),
