@@ -12,17 +12,15 @@ from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import Any, ClassVar, NamedTuple
 
-import numpy as np
-
-from solver.compliant_contact import with_evolution
-from solver.model import ReducedModel, with_friction
+from solver.model import ReducedModel
 from solver.packing import Packed, unpack
 from solver.settings import Automatic, SolverSettings
 from studyrunner.kinds.estimate import AUTOMATIC_HARMONICS
+from studyrunner.kinds.joint import TaskJoint, joint_of
 from studyrunner.mpi.dispatch import CostKeys
 from studyrunner.points.table import Points
 from studyrunner.scene.scene import SceneFacts
-from studyrunner.scene.scene_set import ContactChange, SceneSet, contact_changes, frequencies
+from studyrunner.scene.scene_set import SceneSet, contact_changes, frequencies
 from studyrunner.study.sections import AUTO, SOLVER_AXES
 from studyrunner.study.study import Study
 from studyrunner.system.machine import MappedFile, package_digest
@@ -41,56 +39,6 @@ Keep = Callable[[Packed | str | Part], None]
 
 EQUAL_POINTS = "all values are those of another point"
 """Reason for a result that points share, whatever the kind of study."""
-
-
-Evolving = tuple[tuple[str, tuple[tuple[str, tuple[float, ...]], ...]], ...]
-"""`EvolutionSection.tables` as pairs of name and content, with the energies, J/m2, as the first."""
-
-
-@dataclass(frozen=True)
-class TaskJoint:
-    """The joint that a task computes.
-
-    scene: number of the scene (`SceneSet`). friction_coefficient: of all pairs; None where each pair has its own.
-    contact: arrays of the contact interface in place of those of the scene, and `energy` with which it begins, J/m2.
-    evolution: what changes with the dissipated energy (`Evolving`); () for nothing.
-    """
-
-    scene: int
-    friction_coefficient: float | None
-    contact: ContactChange = ()
-    evolution: Evolving = ()
-
-    def model(self, models: Mapping[int, ReducedModel]) -> ReducedModel:
-        """The model of the scene with its friction and what is drawn for the pairs. models: by number of the scene."""
-        model = models[self.scene]
-        drawn: dict[str, Any] = {name: np.array(values) for name, values in self.contact}
-        energy = drawn.pop("energy", np.zeros(model.contact.n_contact))
-        model = replace(model, contact=replace(model.contact, **drawn))
-        if self.evolution:
-            model = evolving(model, self.evolution)
-            model = replace(model, contact=model.contact.after(energy))
-        return with_friction(model, self.friction_coefficient)
-
-
-def evolving(model: ReducedModel, evolution: Evolving) -> ReducedModel:
-    """The model of a joint whose contact changes. KeyError where a surface has no table."""
-    (_, ((_, energy),)), *tables = evolution
-    of_pairs = dict[str, Any]()
-    for name, by_surface in tables:
-        known = dict(by_surface)
-        of_pairs[name] = [known[""] if "" in known else known[label] for label in model.contact.surface]
-    return with_evolution(model, energy, **of_pairs)
-
-
-def joint_of(study: Study, scene: int, contact: ContactChange) -> TaskJoint:
-    """The joint of a part of a study. scene: its number. contact: what is drawn for its pairs."""
-    own = "friction_coefficient" in study.evolving or any(name == "friction_coefficient" for name, _ in contact)
-    evolution: Evolving = ()
-    if study.wear.evolution is not None:
-        tables = {"energy": {"": study.wear.evolution.energy}, **study.evolving}
-        evolution = tuple((name, tuple(each.items())) for name, each in tables.items())
-    return TaskJoint(scene, None if own else study.friction_coefficient, contact, evolution)
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ from solver.packing import Packed
 from solver.settings import Direction, Passage, SolverSettings, WearTarget
 from studyrunner.kinds import task as tasks
 from studyrunner.kinds.estimate import iterations_of_sweep, seconds_of
+from studyrunner.kinds.joint import TaskJoint
 from studyrunner.kinds.missions.kind import OF_A_MISSION
 from studyrunner.kinds.results import deepest, describe_target, first_harmonic, named
 from studyrunner.points.table import Points
@@ -25,7 +26,7 @@ from studyrunner.system.progress import count
 if TYPE_CHECKING:
     from solver.missions.mission import MissionHistory
 
-_NO_JOINT = tasks.TaskJoint(0, None)
+_NO_JOINT = TaskJoint(0, None)
 # Newton iterations, see `estimate`
 _OF_BLOCK = 20  # of a mission, after its start state (slider: 10 to 35)
 _OF_PASSAGE = 900  # (dovetail with 16 pairs, rtol 0.1: 970, 2500 with 40 frequencies, 330 where nothing slips)
@@ -49,7 +50,7 @@ class PlannedBlock:
     """A block of a mission, as the `Block` of the solver, but cycles are in one mission, also of a passage."""
 
     name: str
-    joint: tasks.TaskJoint
+    joint: TaskJoint
     frequency: float | Passage
     excitation_amplitude: float
     cycles: float
@@ -167,7 +168,7 @@ def _iterations(blocks: Sequence[tuple[str, float | Passage]], missions: float) 
 
 
 def _blocks(
-    part: Study, joints: Sequence[tasks.TaskJoint], frequency_at: int, amplitude_at: int, sweep_at: int
+    part: Study, joints: Sequence[TaskJoint], frequency_at: int, amplitude_at: int, sweep_at: int
 ) -> Iterator[PlannedBlock]:
     """The blocks of a point, from its places on the axes."""
     at = {"frequency": frequency_at, "excitation_amplitude": amplitude_at}

@@ -9,6 +9,7 @@ import numpy as np
 from solver.model import ReducedModel
 from studyrunner.kinds import task as tasks
 from studyrunner.kinds.estimate import seconds_of
+from studyrunner.kinds.joint import TaskJoint
 from studyrunner.kinds.modes.kind import OF_A_MODE_POINT
 from studyrunner.kinds.results import first_harmonic, named
 from studyrunner.points.table import Points
@@ -27,7 +28,7 @@ class Mode(tasks.Task):
     mode: its number, from 1. direction: "up" or "down" along the amplitude. amplitudes: m sqrt(kg), ascending.
     """
 
-    joint: tasks.TaskJoint
+    joint: TaskJoint
     mode: int
     direction: str
     amplitudes: tuple[float, ...]

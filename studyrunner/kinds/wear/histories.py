@@ -15,8 +15,9 @@ from solver.model import ReducedModel
 from solver.outcome import Outcome
 from solver.packing import Packed, pack, unpack
 from solver.settings import FollowedFrequency, Resolution, ToTheEnd, WearTarget
+from studyrunner.kinds.joint import TaskJoint
 from studyrunner.kinds.results import deepest, describe_target, first_harmonic, named
-from studyrunner.kinds.task import Identity, Keep, PointResult, StartResult, Task, TaskJoint, Work, digest, up_or_down
+from studyrunner.kinds.task import Identity, Keep, PointResult, StartResult, Task, Work, digest, up_or_down
 from studyrunner.kinds.wear.kind import OF_A_HISTORY, OWN_STEPS
 from studyrunner.kinds.wear.onset import slip_amplitude
 from studyrunner.mpi.dispatch import CostKeys
