@@ -24,7 +24,6 @@ from solver.wear.wearing_joint import WearingJoint, WearRequest
 from tests.references import slider_amplitude
 from tests.solver.models import (
     OMEGA,
-    PRELOAD,
     branch_states,
     case_of,
     cyclic_model,
@@ -36,7 +35,7 @@ from tests.solver.models import (
     with_free_masses,
 )
 from tests.solver.test_elements import MODELS, jacobian_by_differences
-from tests.solver.test_kernels import FREE, MIXED
+from tests.solver.test_kernels import FREE, MIXED, forces_and_history
 
 AREA, LOAD, STROKE = 1e-4, 10.0, 1e-4
 PER_CYCLE = LOAD * 4.0 * STROKE / AREA  # dissipated energy over friction, J/m2
@@ -168,13 +167,7 @@ def test_a_slider_wears_as_cycle_by_cycle_with_its_exact_motion():
 def test_derivatives_by_friction_are_those_of_differences(before):
     model = with_free_masses(random_model(1, MIXED), FREE)
     joint = case_of(model, 0.4, OMEGA, SolverSettings(3, 48)).joint(OMEGA, 60.0)
-    random = np.random.default_rng(2)
-    predicted = random.normal(size=(6, 3, len(joint.basis.synthesis))) * PRELOAD * 0.6
-    predicted[:, 1:, 0] *= 0.1
-    predicted.reshape(18, -1)[np.setdiff1d(np.arange(18), joint.component_index)] = 0.0
-    predicted[~joint.contact.has_normal, 0, 1:] = 0.0
-    predicted[:, 0, 0] = PRELOAD
-    history = random.normal(size=(6, 2)) * 0.1 * PRELOAD / joint.penalty.tangential[:, None]
+    predicted, history = forces_and_history(joint)
     before_t = 0.9 * predicted @ joint.basis.synthesis if before else None
 
     def found(friction):

@@ -187,6 +187,18 @@ def of_pairs(joint, pairs):
     return build_law(joint.penalty.at(pairs), contact, joint.basis, joint.omega)
 
 
+def forces_and_history(joint):
+    """Predicted force, N, under which the pairs of `MIXED` stick, slip and open, and their history, m."""
+    random = np.random.default_rng(2)
+    predicted = random.normal(size=(6, 3, len(joint.basis.synthesis))) * PRELOAD * 0.6
+    predicted[:, 1:, 0] *= 0.1
+    predicted.reshape(18, -1)[np.setdiff1d(np.arange(18), joint.component_index)] = 0.0
+    predicted[~joint.contact.has_normal, 0, 1:] = 0.0
+    predicted[:, 0, 0] = PRELOAD
+    history = random.normal(size=(6, 2)) * 0.1 * PRELOAD / joint.penalty.tangential[:, None]
+    return predicted, history
+
+
 @pytest.mark.parametrize(
     ("resolution", "friction"),
     [(Resolution((1, 2, 3), 32), np.linspace(0.3, 0.55, 6)), (Resolution((1, 3, 5), 64), FRICTION)],
@@ -196,14 +208,7 @@ def test_pairs_of_a_mixed_joint_are_as_they_are_alone(resolution, friction):
     model = with_free_masses(random_model(1, MIXED), FREE)
     joint = case_of(model, friction, OMEGA, SolverSettings(), resolution).joint(OMEGA, 60.0)
     assert np.flatnonzero(joint.penalty.inertial).tolist() == FREE
-    # pairs stick, slip and open
-    random = np.random.default_rng(2)
-    predicted = random.normal(size=(6, 3, len(joint.basis.synthesis))) * PRELOAD * 0.6
-    predicted[:, 1:, 0] *= 0.1
-    predicted.reshape(18, -1)[np.setdiff1d(np.arange(18), joint.component_index)] = 0.0
-    predicted[~joint.contact.has_normal, 0, 1:] = 0.0
-    predicted[:, 0, 0] = PRELOAD
-    history = random.normal(size=(6, 2)) * 0.1 * PRELOAD / joint.penalty.tangential[:, None]
+    predicted, history = forces_and_history(joint)
     together = joint.law.march(predicted, history, None)
     assert {SEPARATED, STICK, SLIP} <= set(together.status_t[FREE].ravel())
     assert {STICK, SLIP} <= set(together.status_t[ELASTIC].ravel())
