@@ -19,7 +19,7 @@ from solver.newton.period_preconditioner import build_period_factor, stiffness_o
 from solver.newton.run import Bordered, BorderedProblem, Run, bordered_step, solve_newton
 from solver.settings import Resolution, SolverSettings, all_orders
 from solver.structure.harmonic_stiffness import DenseStiffness
-from tests.solver.models import PRELOAD, case_of, random_balance, random_model
+from tests.solver.models import PRELOAD, case_of, random_balance, random_model, scene
 
 
 @dataclass
@@ -127,6 +127,18 @@ def test_a_kept_factorisation_follows_jacobians_that_change(kinds, seed, wear):
         # wear in the step is so large that signs of both kinds come up
         assert solver.determinant_sign(tangent) == np.linalg.slogdet(dense_of(tangent))[0]
         predicted = predicted + 0.05 * np.abs(predicted).mean() * random.normal(size=predicted.shape)
+
+
+def test_a_march_that_is_negative_is_asked_of_dense_factors():
+    # all pairs of a travelling wave slip: with the harmonics that are left out the march has the other sign
+    omega, resolution = 2.0 * np.pi * 214.2, Resolution(all_orders(9), 128)
+    model = scene("dovetail_sector", 9, mesh=1, nodal_diameter=3)
+    joint = case_of(model, 0.5, omega, SolverSettings(), resolution).joint(omega, 1.5)
+    balance = Balance(joint, np.zeros((joint.contact.n_contact, 2)))
+    stuck = -balance.evaluate(np.zeros((joint.component_index.size, 19))).residual
+    tangent = tangent_of(balance, stuck)
+    assert build_period_factor(tangent).sign == -1.0
+    assert JacobianSolver().determinant_sign(tangent) == np.linalg.slogdet(dense_of(tangent))[0] == 1.0
 
 
 def test_a_kept_factorisation_is_of_no_use_for_other_harmonics():
