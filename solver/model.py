@@ -182,13 +182,17 @@ class ContactInterface(_ByRows):
         return (1.0 / stiffness - 1.0 / first)[:, None] * share, (-slope / stiffness**2)[:, None] * share
 
     def relative_change(self, energy: FloatArray) -> float:
-        """Largest relative change of what the contact is now by a change of the energy (n_contact,), J/m2."""
-        largest = 0.0
-        for name in EVOLVING:
-            found = self.evolution and self.evolution.now(name)
-            if found:
-                largest = max(largest, float(np.abs(found[1] * energy / found[0])[self.rubs].max(initial=0.0)))
-        return largest
+        """Largest relative change of the contact by a change of the energy (n_contact,), J/m2, in the steepest part of
+        each table that lies ahead: a contact may begin to change later.
+        """
+        if self.evolution is None:
+            return 0.0
+        ahead, steepest = self.evolution.energy[1:] > self.evolution.begun[:, None], np.zeros(self.n_contact)
+        for table in (found for name in EVOLVING if (found := getattr(self.evolution, name)) is not None):
+            slope = np.abs(np.diff(table, axis=1)) / np.diff(self.evolution.energy)
+            relative = np.where(ahead, slope / np.minimum(table[:, :-1], table[:, 1:]), 0.0)
+            steepest = np.maximum(steepest, relative.max(axis=1))
+        return float((steepest * energy)[self.rubs].max(initial=0.0))
 
     @cached_property
     def has_normal(self) -> BoolArray:

@@ -19,6 +19,7 @@ from solver.results.state_report import evaluated
 from solver.settings import SolverSettings
 from solver.stability.floquet import find_multipliers
 from solver.structure.joint import build_case
+from solver.wear.problem import WearProblem
 from solver.wear.step import rate_slope
 from solver.wear.wearing_joint import WearingJoint, WearRequest
 from tests.references import slider_amplitude
@@ -91,6 +92,37 @@ def test_friction_that_saturates_follows_its_closed_form():
     found = history(*saturates())
     assert found.dissipated_energy[1:, 0] == pytest.approx(EXACT, rel=1e-4)
     assert (np.abs(found.dissipated_energy[1:, 0] - EXACT) <= found.dissipated_energy_error[1:, 0]).all()
+
+
+TI_CYCLES = np.array([0.0, 12.0, 118.0, 498.0, 1001.0, 2002.0, 2998.0, 3999.0, 4310.0])
+TI_FRICTION = np.array([0.102, 0.102, 0.116, 0.121, 0.126, 0.142, 0.201, 0.277, 0.328])
+"""Friction of Ti-6Al-4V on itself over cycles, measured (Fouvry and others, Wear 2017)."""
+
+
+@pytest.mark.parametrize("wear", [1e-12, 0.0])
+def test_measured_friction_in_gives_the_measured_loops(wear):
+    # linear over the energy, friction is exponential in the cycles between two measurements; before the first it rests
+    ratio = np.log(TI_FRICTION[1:] / TI_FRICTION[:-1])
+    mean = np.divide(np.diff(TI_FRICTION), ratio, out=TI_FRICTION[1:].copy(), where=ratio > 0.0)
+    energy = PER_CYCLE * np.concatenate([[0.0], np.cumsum(np.diff(TI_CYCLES) * mean)])
+    model, omega = driven(energy, friction_coefficient=TI_FRICTION)
+    found = history(model, omega, counts=TI_CYCLES, wear=wear)
+    loops = found.friction_power[:, 0] * 2.0 * np.pi / omega
+    assert loops == pytest.approx(PER_CYCLE * TI_FRICTION, rel=1e-3)
+    assert found.dissipated_energy[:, 0] == pytest.approx(energy, rel=1e-3)
+    assert (np.abs(found.dissipated_energy[:, 0] - energy) <= found.dissipated_energy_error[:, 0]).all()
+
+
+def test_adaptive_steps_are_of_second_order(monkeypatch):
+    off, steps, step = [], [], WearProblem.step
+    monkeypatch.setattr(WearProblem, "step", lambda of, state: (seen.append(of.guide), step(of, state))[1])
+    for rtol in (1e-2, 1e-4):
+        seen: list[object] = []
+        found = history(*saturates(), settings=replace(GIVEN, rtol=rtol))
+        off.append(np.abs(found.dissipated_energy[1:, 0] / EXACT - 1.0).max())
+        # without those of the reference solution, which has a guide
+        steps.append(seen.count(None))
+    assert np.log(off[0] / off[1]) / np.log(steps[1] / steps[0]) == pytest.approx(2.0, abs=0.3)
 
 
 @pytest.mark.parametrize("scheme", ["implicit", "explicit"])
