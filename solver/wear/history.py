@@ -7,10 +7,11 @@ from functools import partial
 from typing import Any
 
 import numpy as np
+import scipy.linalg
 
 from solver.accuracy.certificate import NOT_CERTIFIED
 from solver.harmonic_balance.state import Failure
-from solver.model import ContactInterface, FloatArray, ReducedModel
+from solver.model import ContactInterface, FloatArray, IntArray, ReducedModel
 from solver.packing import Packed
 from solver.results.history import StartState, WearHistory, first_cut_off, judge, last_error
 from solver.results.state_report import LOOP_PHASES
@@ -20,6 +21,10 @@ from solver.wear.errors import compare, reach_target
 from solver.wear.problem import WearProblem, reference_of
 from solver.wear.slow_time import Course, Integrator, Node, Solution
 from solver.wear.wearing_joint import Record, WearRequest
+
+LAG = 0.01
+"""Change of the worn volume by a vibration that follows its contact late, above which a history says so. Dovetail,
+212.42 Hz, 2000 cycles, friction from 0.3 to 0.5 within 1e5 J/m2: 8 % against an integration in time."""
 
 _REPORTED = frozenset(each.name for each in fields(WearHistory))
 
@@ -56,8 +61,35 @@ def integrate_together(
             history = replace(history, unjudged=history.message)
             rows = np.flatnonzero(np.isfinite(history.worn_volume))
             outcome, message = judge(history, rows, settings.rtol)
-            history = replace(history, outcome=outcome, message=message)
+            lag = describe_lag(model, history, rows) if model.contact.evolves else ""
+            history = replace(history, outcome=outcome, message="; ".join(filter(None, (message, lag))))
         yield history
+
+
+def describe_lag(model: ReducedModel, history: WearHistory, rows: IntArray) -> str:
+    """What it means for the worn volume that a vibration needs some periods to follow a change of the contact, while it
+    is steady at each count of a history; "" below `LAG`.
+
+    A vibration that follows after n periods has worn at the count N as much as a steady one at N - n, at whose begin
+    are n periods at the first rate. n: within which a vibration of the stuck structure falls to 1/e, by its mode next
+    to the frequency; slip damps more, so that it is less. rows: known counts.
+    """
+    linear, last = model.harmonic_structure(1), rows[-1:]
+    inner = np.setdiff1d(np.arange(len(linear.mass)), model.contact.dofs)
+    mass, stiffness, damping = (each[np.ix_(inner, inner)] for each in (linear.mass, linear.stiffness, linear.damping))
+    if not inner.size or not last.size or not (volume := float(history.worn_volume[last[0]])) > 0.0:
+        return ""
+    omega = 2.0 * math.pi * float(history.excitation_frequency[last[0]])
+    squares, modes = scipy.linalg.eigh(stiffness, mass)
+    near = int(np.abs(np.sqrt(np.abs(squares)) - omega).argmin())
+    decay = 0.5 * float(np.real(modes[:, near].conj() @ damping @ modes[:, near]))
+    periods = omega / (2.0 * math.pi * decay) if decay > 0.0 else math.inf
+    begun, ended = history.wear_rate[rows[[0, -1]]].tolist()
+    off = abs(ended - begun) * min(periods, float(history.cycles[last[0]])) / volume
+    if off <= LAG:
+        return ""
+    needs = f"the vibration needs up to {periods:.3g} periods to follow a change of the contact"
+    return f"{needs}, which may change the worn volume by {100.0 * off:.2g} %: no error bar contains it"
 
 
 def _unknown_course(model: ReducedModel, n_loops: int) -> Course:

@@ -133,6 +133,14 @@ def test_given_steps_are_of_first_order_and_know_their_error(scheme):
     assert (off <= found[0].dissipated_energy_error[1:, 0]).all()
 
 
+@pytest.mark.parametrize(("energy", "lags"), [(2e6, False), (2e4, True)])
+def test_a_contact_that_changes_faster_than_the_vibration_follows_is_said(energy, lags):
+    asked = {"wear": 1.1e-11, "counts": np.array([0.0, 2000.0]), "load": 0.5, "settings": SolverSettings(harmonics=5, samples=64)}
+    model = with_evolution(dovetail(5), [0.0, energy], friction_coefficient=[0.3, 0.5])
+    found = history(model, 2.0 * np.pi * 212.42, **asked)
+    assert ("periods to follow a change of the contact" in found.message) == lags
+
+
 def with_rule(model, friction):
     """The model with constant tables."""
     return with_evolution(model, [0.0, 1e6, 3e6], friction_coefficient=3 * [friction], wear_factor=3 * [1.0])
