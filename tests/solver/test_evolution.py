@@ -135,7 +135,12 @@ def test_given_steps_are_of_first_order_and_know_their_error(scheme):
 
 @pytest.mark.parametrize(("energy", "lags"), [(2e6, False), (2e4, True)])
 def test_a_contact_that_changes_faster_than_the_vibration_follows_is_said(energy, lags):
-    asked = {"wear": 1.1e-11, "counts": np.array([0.0, 2000.0]), "load": 0.5, "settings": SolverSettings(harmonics=5, samples=64)}
+    asked = {
+        "wear": 1.1e-11,
+        "counts": np.array([0.0, 2000.0]),
+        "load": 0.5,
+        "settings": SolverSettings(harmonics=5, samples=64),
+    }
     model = with_evolution(dovetail(5), [0.0, energy], friction_coefficient=[0.3, 0.5])
     found = history(model, 2.0 * np.pi * 212.42, **asked)
     assert ("periods to follow a change of the contact" in found.message) == lags
