@@ -85,6 +85,30 @@ def test_a_contact_evolves_on_from_where_a_result_has_left_it():
     assert read_study("later.nc").evolving == read_study("out.nc").evolving
 
 
+MODES = """
+[study]
+name = "modes"
+[scene]
+model = "sdof_slider"
+{scene}
+[axes]
+modal_amplitude = [5e-5, 1e-4]
+sweep = "down"
+{wear}
+"""
+
+
+def test_modes_are_those_of_the_joint_that_has_evolved():
+    tables = "[wear.evolution]\nenergy = [0, 1e5]\nfriction_coefficient = [0.3, 0.5]"
+    worn = "worn = {depth = [[0.0], [0.0]], energy = [[0.0], [5e4]], cycle = [0, 100]}"
+    Path("evolved.toml").write_text(MODES.format(scene=worn, wear=tables))
+    evolved = compute("evolved.toml", "evolved.nc")
+    for friction, found in zip((0.3, 0.4), evolved.transpose("cycle", ...).damping_ratio.values, strict=True):
+        Path("plain.toml").write_text(MODES.format(scene=f"friction_coefficient = {friction}", wear=""))
+        plain = compute("plain.toml", "plain.nc")
+        assert found.ravel() == pytest.approx(plain.damping_ratio.values.ravel(), rel=1e-9)
+
+
 # --- where slip begins ---
 
 
