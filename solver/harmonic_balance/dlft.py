@@ -169,7 +169,7 @@ class Evaluation(Marched):
     start_history: FloatArray
     displacement_h: FloatArray
     wear_depth: FloatArray
-    energy: FloatArray = field(default_factory=lambda: np.full(1, np.nan))
+    energy: FloatArray
 
     @property
     def slow(self) -> FloatArray:

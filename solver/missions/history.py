@@ -172,7 +172,7 @@ def unworn_course(mission: MissionRequest) -> Course:
     results = (BlockResult(nothing, nothing, unknown.astype(complex), unknown),) * len(mission.blocks)
     course = Course(mission.area, np.array(mission.missions, np.float64), mission.until)
     row = np.tile(nothing, len(results))
-    return course.after(Node(0.0, row, row, values_of(results) | {"local": nothing}, (), row, row))
+    return course.after(Node(0.0, row, row, row, row, values_of(results) | {"local": nothing}))
 
 
 def integrate_missions(

@@ -104,7 +104,7 @@ def attempt_step(
     values["local"] = now.values["local"] + error + length * of_blocks
     guides = tuple(each.guide for each in results)
     slow_now = energy.ravel(), energy_rates.ravel()
-    end = Node(now.count + length, growth.ravel(), rates.ravel(), values, guides, *slow_now)
+    end = Node(now.count + length, growth.ravel(), rates.ravel(), *slow_now, values, guides)
     ratio = float(error @ area) / most
     if contact.evolves and length > 1:
         heat = float(slow[1].sum(axis=0) @ area), float(energy.sum(axis=0) @ area)

@@ -102,7 +102,7 @@ def _unknown_course(model: ReducedModel, n_loops: int) -> Course:
     values |= vars(NOT_CERTIFIED) | {"harmonics_used": 0, "samples_used": 0}
     values |= {"local": math.nan, "resolution_error": math.nan}
     # before all counts
-    return Course(model.contact.area, nodes=(Node(-1.0, of_pairs, of_pairs, values),))
+    return Course(model.contact.area, nodes=(Node(-1.0, of_pairs, of_pairs, of_pairs, of_pairs, values),))
 
 
 def _solve(integrator: Integrator, case: Case, start: StartState, request: WearRequest, spent: float = 0.0) -> Solution:

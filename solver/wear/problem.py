@@ -118,7 +118,7 @@ class WearProblem(WearingJoint):
         # local: sum of the local errors of the steps so far, m3
         values = report | {"local": after.last.error + local}
         depth, energy = after.at.slow
-        return after, course.after(Node(after.cycle, depth, after.rate, values, (), energy, after.energy_rate))
+        return after, course.after(Node(after.cycle, depth, after.rate, energy, after.energy_rate, values))
 
     def _judged_alone(self, state: WearState, report: dict[str, Any]) -> WearState:
         """The state of a history of zero cycles, whose response is the result: judged by its error with the sweep."""

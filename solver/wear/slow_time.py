@@ -43,21 +43,21 @@ class Node:
 
     count: of cycles or missions. depth, rate (k,): worn depths, m, and their rates, m per count, of the pairs; of
     missions those of all blocks in one row. energy, energy_rate (k,): in the same way, the energy that friction has
-    dissipated, J/m2. values: other numbers and arrays, by name. guides: of the blocks.
+    dissipated, J/m2. values: other numbers and arrays, by name. guides: of the blocks of a mission.
     """
 
     count: float
     depth: FloatArray
     rate: FloatArray
+    energy: FloatArray
+    energy_rate: FloatArray
     values: dict[str, Any]
     guides: tuple[Any, ...] = ()
-    energy: FloatArray = field(default_factory=lambda: np.full(1, np.nan))
-    energy_rate: FloatArray = field(default_factory=lambda: np.full(1, np.nan))
 
     @property
     def slow(self) -> FloatArray:
         """Depths, m, and dissipated energies, J/m2 (2, k)."""
-        return np.array([self.depth, np.broadcast_to(self.energy, self.depth.shape)])
+        return np.array([self.depth, self.energy])
 
 
 @packable

@@ -140,7 +140,7 @@ def node(count, depth, rate, value, resolution=RESOLUTIONS[0], **more):
     numbers |= dict.fromkeys(("response_mean", "response_peak"), np.full(1, value))
     numbers["response"] = np.full(1, value * 1j)
     numbers |= dict.fromkeys(CERTIFIED, value) | dict(zip(("harmonics_used", "samples_used"), resolution, strict=True))
-    return Node(count, np.array(depth, float), np.array(rate, float), numbers | more)
+    return Node(count, np.array(depth, float), np.array(rate, float), np.zeros(2), np.zeros(2), numbers | more)
 
 
 def taken(counts, n_steps=3, **more):
