@@ -110,7 +110,9 @@ class MissionProblem:
         nodes, rtol = here.course.nodes, self.mission.settings.rtol * (1.0 if self.history is None else RTOL_RATIO)
         number = int(nodes[-1].count + length)
         run_mission = partial(self._mission, here, number, number in self._tested)
-        contact = self.mission.blocks[0].model.contact
+        contacts = [block.model.contact for block in self.mission.blocks]
+        # what they have in common but the change with the energy
+        contact = next((each for each in contacts if each.evolves), contacts[0])
         step = attempt_step(nodes, int(length), contact, run_mission, SHARE_OF_CAUSE * rtol)
         if isinstance(step, MissionStep):
             return step

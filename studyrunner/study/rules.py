@@ -123,11 +123,13 @@ def _evolution(study: Study) -> Iterator[Wrong]:
         given = dict(study.scene.parameters).get(name)
         if name in study.scene.parameters.model_fields_set and given is not None:
             yield Wrong(f"scene.{name}", given, remedy)
-        for block in study.mission:
-            if name in block.parameters:
-                yield Wrong(f"mission.{block.name}.{name}", block.parameters[name], remedy)
         if study.scatter is not None and name in study.scatter.inputs:
             yield Wrong(f"scatter.{name}", None, remedy)
+    for block in study.mission:
+        evolution = block.evolution or study.wear.evolution
+        for name in (evolution.tables.keys() if evolution else {}) & block.parameters.keys():
+            remedy = f"leave it out: the first numbers of evolution.{name} are those of the unworn joint"
+            yield Wrong(f"mission.{block.name}.{name}", block.parameters[name], remedy)
 
 
 def _limits(study: Study) -> Iterator[Wrong]:

@@ -41,6 +41,25 @@ def run(*overrides, output="out.nc"):
     return compute("missions.toml", output, *overrides)
 
 
+def test_blocks_have_friction_tables_of_their_own():
+    """Constant ones are equal to the bit to numbers of the blocks."""
+
+    def worn(cold, hot):
+        blocks = "".join(
+            f'[[mission]]\nname = "{name}"\nfrequency = 160.0\nexcitation_amplitude = 10.0\ncycles = 1000\n{own}\n'
+            for name, own in (("cold", cold), ("hot", hot))
+        )
+        head = MISSIONS.split("[[mission]]")[0].replace("frequency = [160, 161]\n", "")
+        Path("own.toml").write_text(head + blocks, encoding="utf-8")
+        rest = "slow_time.missions=3", "slow_time.outputs=2", "axes.wear_coefficient=1e-11", "axes.sweep=up"
+        return compute("own.toml", "own.nc", *rest).worn_volume.values.ravel()
+
+    table = "evolution = {{energy = [0, 1e5], friction_coefficient = [{}, {}]}}".format
+    plain = worn("friction_coefficient = 0.3", "friction_coefficient = 0.5")
+    assert worn(table(0.3, 0.3), table(0.5, 0.5)).tolist() == plain.tolist()
+    assert worn(table(0.3, 0.4), table(0.5, 0.5))[-1] != pytest.approx(plain[-1], rel=1e-3)
+
+
 @pytest.mark.slow
 def test_the_result_has_missions_and_blocks_and_the_values_of_the_solver(blocks):
     result = run()

@@ -148,6 +148,9 @@ scatter.samples, scatter.mu.normal.sigma, axes.damping, scene.area, scene.mas
         mission.heavy.begin=continue
         mission.run-up.begin=ramp -> mission.run-up.frequency
         mission.heavy.wear_coefficient=1.0
+        mission.heavy.evolution={energy=[1, 2], wear_factor=[1, 2]} -> mission.heavy.evolution.energy = 1.0
+        mission.heavy.friction_coefficient=0.4 ; \
+mission.heavy.evolution={energy=[0, 1e5], friction_coefficient=[0.3, 0.5]} -> mission.heavy.friction_coefficient = 0.4
         mission.heavy.name=cruise -> mission.name
         mission=[]
         scatter={samples=4, frequency={normal={std=1.0}}} -> scatter.frequency

@@ -9,7 +9,7 @@ from solver.settings import Passage
 from studyrunner.kinds.wear.kind import WEAR
 from studyrunner.study.mistakes import check_tables, keys_as_given, nearest_name, raise_wrong
 from studyrunner.study.scene_section import Origin, find_scene
-from studyrunner.study.sections import IDLE_FREQUENCY, AxesSection, SlowTimeSection
+from studyrunner.study.sections import IDLE_FREQUENCY, AxesSection, EvolutionSection, SlowTimeSection
 from studyrunner.study.study import Study
 from studyrunner.user_error import UserError
 from studyrunner.values import Positive, Section, Wrong
@@ -52,6 +52,7 @@ class MissionBlock(Section):
         " block before",
     )
     excitation_amplitude: Positive | None = Field(None, description="N; or that of [axes]")
+    evolution: EvolutionSection | None = Field(None, description="in place of [wear.evolution] in this block")
 
     def rules(self) -> Iterator[Wrong]:
         """A block has one frequency and one duration."""
@@ -140,11 +141,12 @@ def broken_rules(study: Study) -> Iterator[Wrong]:
     for before, block in zip((*blocks[-1:], *blocks), blocks, strict=False):
         key, (theirs, ours) = f"mission.{block.name}", (before.parameters, block.parameters)
         changed = any(theirs.get(name) != ours.get(name) for name in {**theirs, **ours})
+        changed = changed or before.evolution != block.evolution
         if not block.gives("frequency") and not axes.frequency:
             yield Wrong(f"{key}.frequency", None, "missing: give it here, or axes.frequency for all blocks without one")
         no_sweep = block.begin == "sweep" and block.passage is None and "ramp" in axes.sweep
         if no_sweep or (block.begin == "continue" and changed):
-            remedy = 'give "ramp": only blocks with the same keys of [scene] continue, and axes.sweep sweeps up or down'
+            remedy = 'give "ramp": only blocks of the same joint continue, and axes.sweep sweeps up or down'
             yield Wrong(f"{key}.begin", block.begin, remedy)
     for name in (*_OWN_AXES, *(axis.name for axis in study.scene_axes)):
         given = name not in _OWN_AXES or name in axes.model_fields_set
@@ -175,6 +177,7 @@ def complete(study: Study, given: Mapping[str, Any], origin: Origin) -> Study:
             "slow_time": SlowTimeSection(),
             "scene": of_block,
             "axes": axes,
+            "wear": study.wear.model_copy(update={"evolution": block.evolution or study.wear.evolution}),
         }
         studies.append(study.model_copy(update=alone))
     return study.model_copy(update={"block_studies": tuple(studies)})
