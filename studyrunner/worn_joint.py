@@ -15,7 +15,7 @@ from studyrunner.api import run_study
 from studyrunner.points.table import points_of
 from studyrunner.result.pairs import depths, has_depths, pairs_of_scene
 from studyrunner.result.view import NO_VOLUME, Result, open_for_report
-from studyrunner.study.scene_section import WORN_AXIS
+from studyrunner.study.scene_section import WORN_AXIS, worn_before
 from studyrunner.study.sections import SOLVER_AXES
 from studyrunner.study.study_file import read_study
 from studyrunner.user_error import UserError
@@ -135,9 +135,8 @@ def _depths(result: Result, shown: Mapping[str, int], last: int, *, only_last: b
     """
     if not has_depths(result):
         raise UserError(str(result.path), "wear_depth", None, result.lacks("wear_depth"))
-    depth = depths(result, shown)[:, pairs_of_scene(result, shown)]
-    if result.has("worn_depth"):
-        depth = depth + result.dataset["worn_depth"].isel(shown, missing_dims="ignore").values
+    state = shown.get(WORN_AXIS, 0)
+    depth = depths(result, shown)[:, pairs_of_scene(result, shown)] + worn_before(result.study, "wear_depth", state)
     places = [last] if only_last or last == 0 or np.isnan(depth[0]).any() else [0, last]
     cycles = result.cycles[places]
     whole = {"depth": depth}
@@ -145,10 +144,7 @@ def _depths(result: Result, shown: Mapping[str, int], last: int, *, only_last: b
         if not result.has("dissipated_energy"):
             raise UserError(str(result.path), "dissipated_energy", None, result.lacks("dissipated_energy"))
         energy = result.at("dissipated_energy", shown).values[:, pairs_of_scene(result, shown)]
-        scene: Any = result.study["scene"]
-        states = (scene.get("worn") or {}).get("energy")
-        before = states[shown.get(WORN_AXIS, 0)] if states else 0.0
-        whole["energy"] = energy + np.array(before)
+        whole["energy"] = energy + worn_before(result.study, "dissipated_energy", state)
     if not np.isfinite(cycles).all():
         return {name: [each[last].tolist()] for name, each in whole.items()}
     return {**{name: each[places].tolist() for name, each in whole.items()}, "cycle": cycles.tolist()}

@@ -1,12 +1,14 @@
 """[scene] of a study: the scene that its model names, its parameters, its files, and wear before its history begins."""
 
 import math
+import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
 import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, InstanceOf, SerializeAsAny
 
 from studies.scene_source import SceneSource, source_of
@@ -178,8 +180,21 @@ def read_worn(table: object, source: str, folder: Path) -> Worn:
         return Worn(**found, cycle=given.cycle, result=given.result)
 
 
+def worn_before(study: Mapping[str, Any], name: str, state: int) -> NDArray[np.float64]:
+    """The depth, m, or the energy, J/m2, with which a state of the study of a result began, of each pair or of all
+    (n_contact or 1,); 0 of an unworn joint.
+
+    study: tables of the study. name: "wear_depth" or "dissipated_energy". state: number on the axis `WORN_AXIS`.
+    """
+    key = "energy" if name == "dissipated_energy" else "depth"
+    states = (study.get("scene", {}).get("worn") or {}).get(key)
+    return np.array(states[state] if states else (0.0,))
+
+
 def _worn_in(dataset: "xr.Dataset", name: str, point: Mapping[str, object], cycle: Sequence[float], source: str) -> Any:
-    """Depths, m, or energies, J/m2 (n_states, n_contact), of a point of a result at cycle counts."""
+    """Depths, m, or energies, J/m2 (n_states, n_contact), of a point of a result at cycle counts, with those with which
+    its history began.
+    """
     if name not in dataset:
         raise UserError(source, "scene.worn.result", None, f"give a result with {name} among its variables")
     depths = dataset[name]
@@ -211,4 +226,4 @@ def _worn_in(dataset: "xr.Dataset", name: str, point: Mapping[str, object], cycl
         if not np.isfinite(row).all():
             remedy = "give an earlier cycle count: the result does not hold the depths of this one"
             raise UserError(source, "scene.worn.cycle", count, remedy)
-    return chosen
+    return chosen + worn_before(tomllib.loads(dataset.attrs.get("study", "")), name, places.get(WORN_AXIS, 0))

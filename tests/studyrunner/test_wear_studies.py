@@ -83,6 +83,10 @@ def test_a_contact_evolves_on_from_where_a_result_has_left_it():
     later = compute("evolving.toml", "later.nc", *rest)
     assert later.pair_friction.values.ravel() == pytest.approx(friction[0, 1:], rel=2e-3)
     assert read_study("later.nc").evolving == read_study("out.nc").evolving
+    # once more: with what the later result began with, too
+    third = compute("evolving.toml", "third.nc", rest[0], "scene.worn={result='later.nc', cycle=10000}", *rest[2:])
+    assert third.worn_depth.item() == pytest.approx(whole.wear_depth.values[..., 0].reshape(2, 3)[0, 2], rel=5e-3)
+    assert third.pair_friction.values.ravel()[0] == pytest.approx(friction[0, 2], rel=2e-3)
 
 
 MODES = """
