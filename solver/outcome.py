@@ -121,7 +121,7 @@ _MORE = {
     Outcome.CONTACT_CUT_OFF: ": a pair at their edge carries load or wears. Give the model pairs farther out: a"
     " bundled scene needs a larger half_width, or none, and as many more strips or patches.",
     Outcome.ADRIFT: ": they drift along each other, and there is no periodic vibration. Less excitation, more friction"
-    " or a stop would hold them.",
+    " or a stop, as retention_stiffness of a scene, would hold them.",
     Outcome.UNSETTLED: ": after some hundred periods it does not repeat, as happens where the whole joint slips or"
     " opens. More static load, friction or damping, or less excitation, would help.",
     Outcome.RESONANCE_LOST: ": message says where. The values before are valid.",

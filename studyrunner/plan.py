@@ -171,6 +171,12 @@ def doubts_of_study(study: Study, facts: SceneFacts | None = None) -> tuple[str,
         _question(
             "loss_factor", _numbers(parts, "loss_factor"), ("", 0.0, 0.5, {"percent": 0.01}), "more than metals have"
         ),
+        _question(
+            "wear.evolution.energy",
+            study.wear.evolution.energy[-1:] if study.wear.evolution else [],
+            ("J/m2", 100.0, math.inf, {"kJ/m2": 1e3, "J/mm2": 1e6}),
+            "less than a joint dissipates in some cycles",
+        ),
         # 314 rad/s is 3000 rpm
         _question("rotation_speed", speed, ("rpm", 1000.0, math.inf, _UNITS_OF_SPEED), "slow for a machine"),
     ]

@@ -38,8 +38,18 @@ _MOST_VALUES = 2**27  # of a variable without contact pairs, which may be read a
 _MOST_NAMES = 2**20  # values along any dimension
 _LARGEST_READ = 2**24  # bytes
 _LARGEST_NUMBER = 1e30
-_INFINITE = ("_error", "error_estimate", "step_limit", "cycle_count", "last_cycle", "sweep_rate", *CERTIFICATE)
-"""Ends of the names of variables that may be infinite: errors not known, after any cycle, rates without damping."""
+_INFINITE = (
+    "_error",
+    "error_estimate",
+    "step_limit",
+    "cycle_count",
+    "last_cycle",
+    "sweep_rate",
+    "pair_stiffness",
+    *CERTIFICATE,
+)
+"""Ends of the names of variables that may be infinite: errors not known, after any cycle, rates without damping, rigid
+contact."""
 _LONGEST = 400  # characters of a text
 _LONG = ("study", "flag_meanings")
 _OF_VARIABLES = ("units", "long_name", "flag_meanings", "flag_values")  # attributes for the report

@@ -93,7 +93,7 @@ WRONG = {
         scene.worn={{result='worn.nc', cycle=[0], freq=1}} -> scene.worn.freq = 1
         scene.worn={{result='worn.nc', cycle=[0], frequency=151}} -> scene.worn.frequency = 151
         scene.worn={{result='worn.nc', cycle=[0], scheme='explicit'}} -> scene.worn.scheme
-        scene.worn={{result='none.nc', cycle=[0]}} -> none.nc: the file
+        scene.worn={{result='none.nc', cycle=[0]}} -> scene.worn.result = "none.nc"
         scene.worn={{result='missions.nc', cycle=[0]}} -> scene.worn.result
         scene.worn={{result='ended.nc', cycle=[1]}} -> scene.worn.cycle = 1.0
         axes.scheme=final ; solver.samples=8 -> solver.samples, axes.scheme

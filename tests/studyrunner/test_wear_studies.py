@@ -10,6 +10,7 @@ from studyrunner.accessor import join_results
 from studyrunner.cli import main
 from studyrunner.kinds.wear.kind import CERTIFICATE, LOOPS, OF_A_HISTORY, USUAL
 from studyrunner.report.figures.wear import draw_excitation
+from studyrunner.result.opening import open_known
 from studyrunner.result.view import open_for_report
 from studyrunner.study.study_file import read_study
 from studyrunner.summary.answer import summary
@@ -87,6 +88,9 @@ def test_a_contact_evolves_on_from_where_a_result_has_left_it():
     third = compute("evolving.toml", "third.nc", rest[0], "scene.worn={result='later.nc', cycle=10000}", *rest[2:])
     assert third.worn_depth.item() == pytest.approx(whole.wear_depth.values[..., 0].reshape(2, 3)[0, 2], rel=5e-3)
     assert third.pair_friction.values.ravel()[0] == pytest.approx(friction[0, 2], rel=2e-3)
+    assert "um at pair 0 with the wear before" in str(third.fretwear.summary()).replace("\n            ", " ")
+    # a rigid contact has an infinite stiffness, and a report
+    assert np.isinf(open_known("out.nc").pair_stiffness).all()
 
 
 MODES = """

@@ -16,6 +16,7 @@ from studyrunner.result.view import NO_MOTION, NO_VOLUME, Point, Result
 from studyrunner.statistics.samples import DRAWN
 from studyrunner.statistics.sentences import describe_limit, describe_ranking, describe_volumes
 from studyrunner.statistics.study_statistics import LIFE, QUANTITIES
+from studyrunner.study.scene_section import WORN_AXIS, worn_before
 from studyrunner.summary.findings import LEAST_ERROR, Finding, show, where_is, with_error
 from studyrunner.system.progress import count
 from studyrunner.units import show_cycles, show_known, show_number, show_percent
@@ -180,6 +181,11 @@ def _deepest(result: Result, point: Point, at: int, where: str) -> Finding:
     text = f"{with_error(depths[pair], error, 'm')} at contact pair {number}" + (f" of {surface}" if surface else "")
     if np.isfinite(place).all():
         text += f", (x, y, z) = ({', '.join(f'{1e3 * each:.4g}' for each in place)}) mm"
+    begun = worn_before(result.study, "wear_depth", point.get(WORN_AXIS, 0))
+    if begun.any():
+        whole = depths + begun
+        most = f"{show(float(whole.max()), 'm')} at pair {int(numbers[int(np.argmax(whole))])}"
+        text += f", since the joint was mounted; {most} with the wear before"
     # mirror pairs, for one
     least = depths[pair] * (1.0 - LEAST_ERROR) - (error if error < SENSITIVE_ERROR * depths[pair] else 0.0)
     also = [int(number) for number in numbers[depths >= least] if number != numbers[pair]]
