@@ -172,7 +172,7 @@ def read_worn(table: object, source: str, folder: Path) -> Worn:
         return given
     path = folder / given.result
     if not path.exists():
-        raise UserError(source, "scene.worn.result", given.result, f"give the path of a result: there is no file {path}")
+        raise UserError(source, "scene.worn.result", given.result, f"give the path of a result: {path} is not there")
     check_result_file(path, str(path))
     with result_errors(str(path)), xr.open_dataset(path.absolute(), engine="netcdf4", decode_times=False) as dataset:
         of_point = given.model_extra or {}, given.cycle, source
