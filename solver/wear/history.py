@@ -24,7 +24,7 @@ from solver.wear.wearing_joint import Record, WearRequest
 
 LAG = 0.01
 """Change of the worn volume by a vibration that follows its contact late, above which a history says so. Dovetail,
-212.42 Hz, 2000 cycles, friction from 0.3 to 0.5 within 1e5 J/m2: 8 % against an integration in time."""
+212.42 Hz, 2000 cycles, friction from 0.3 to 0.5 within 2e4 J/m2: 8 % against an integration in time."""
 
 _REPORTED = frozenset(each.name for each in fields(WearHistory))
 
@@ -70,8 +70,8 @@ def describe_lag(model: ReducedModel, history: WearHistory, rows: IntArray) -> s
     """What it means for the worn volume that a vibration needs some periods to follow a change of the contact, while it
     is steady at each count of a history; "" below `LAG`.
 
-    A vibration that follows after n periods has worn at the count N as much as a steady one at N - n, at whose begin
-    are n periods at the first rate. n: within which a vibration of the stuck structure falls to 1/e, by its mode next
+    A vibration that follows n periods late wears n cycles at the first rate, and then as a steady one; at the end n
+    cycles at the last rate are missing. n: within which a vibration of the stuck structure falls to 1/e, by its mode next
     to the frequency; slip damps more, so that it is less. rows: known counts.
     """
     linear, last = model.harmonic_structure(1), rows[-1:]
