@@ -71,8 +71,8 @@ def describe_lag(model: ReducedModel, history: WearHistory, rows: IntArray) -> s
     is steady at each count of a history; "" below `LAG`.
 
     A vibration that follows n periods late wears n cycles at the first rate, and then as a steady one; at the end n
-    cycles at the last rate are missing. n: within which a vibration of the stuck structure falls to 1/e, by its mode next
-    to the frequency; slip damps more, so that it is less. rows: known counts.
+    cycles at the last rate are missing. n: within which a vibration of the stuck structure falls to 1/e, by its mode
+    next to the frequency; slip damps more, so that it is less. rows: known counts.
     """
     linear, last = model.harmonic_structure(1), rows[-1:]
     inner = np.setdiff1d(np.arange(len(linear.mass)), model.contact.dofs)
