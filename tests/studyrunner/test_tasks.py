@@ -242,6 +242,12 @@ def test_bundled_studies_are_plausible(name):
         ("dovetail", "axes.excitation_amplitude=[1, 1e9]", "excitation_amplitude 1e+09 N", "(then it is 1e+06 N)"),
         ("dovetail", "slow_time.until={wear_depth=5.0}", "slow_time.until.wear_depth 5 m", "in um (then it is 5e-06"),
         ("dovetail", "slow_time.until={worn_volume=1.0}", "slow_time.until.worn_volume 1 m3", "in mm3"),
+        (
+            "running_in",
+            "wear.evolution.energy=[0, 0.01, 0.02, 0.05]",
+            "wear.evolution.energy 0.05 J/m2 is less than a joint dissipates in some cycles",
+            "J/mm2 (then it is 50000 J/m2)",
+        ),
         ("dovetail", "slow_time.cycles=1e20", "slow_time.cycles 1e+20 is more than machines live", "meant"),
         ("mission", "mission.0.excitation_amplitude=1e9", "excitation_amplitude 1e+09 N", "in mN"),
     ],
