@@ -3,11 +3,13 @@
     OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.pictures dovetail.nc
     OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.pictures scatter.nc mission.nc ...
     OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.pictures time-scales
+    OPENBLAS_NUM_THREADS=1 python -m tests.benchmarks.pictures running-in
 
 Results of other bundled studies give one small picture each, the figure of `GALLERY`; `time-scales` a wear history of
-the slider, as the theory explains it. Of `dovetail.nc`, the result of the bundled study, the PNG files of `SHOWN` are
-written, as the report draws them, and `numbers.json`: the study, what the artists of each figure of `NAMES` hold, and a
-checksum of each picture.
+the slider, as the theory explains it; `running-in` the first mode of the joint of that study while it wears, and of one
+whose contact stays as it begins, whose numbers it prints (4 CPU minutes). Of `dovetail.nc`, the result of the bundled
+study, the PNG files of `SHOWN` are written, as the report draws them, and `numbers.json`: the study, what the artists
+of each figure of `NAMES` hold, and a checksum of each picture.
 `tests/studyrunner/test_bundled_studies.py` compares all of that with the bundled study, with the files, and with points
 that are computed anew.
 """
@@ -17,6 +19,7 @@ import json
 import re
 import sys
 import tempfile
+import tomllib
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -56,6 +59,7 @@ GALLERY = {
 }
 """Figure of the report by study."""
 COUNTS, LAST = (0, 16, 40), 200_000  # of the picture of the time scales: places of the outputs, cycles
+AMPLITUDE = 5e-4  # of the picture of running in, m sqrt(kg)
 MOST_POINTS, DIGITS = 30, 6  # of a line that is written down, and of its numbers
 
 
@@ -151,10 +155,41 @@ def draw_time_scales() -> None:
     (FOLDER / "time_scales.png").write_bytes(png)
 
 
+def draw_running_in() -> None:
+    """Writes the picture of frequency and damping of a rough joint over the cycles, and prints them."""
+    source = (FOLDER.parent / "running_in.toml").read_text(encoding="utf-8")
+    evolution = tomllib.loads(source)["wear"]["evolution"]
+    mode = {"axes.modal_amplitude": AMPLITUDE, "scene.friction_coefficient": None, "scene.worn.depth": None}
+    names = {"natural_frequency": "natural frequency (Hz)", "damping_ratio": "damping ratio (%)"}
+    with tempfile.TemporaryDirectory() as folder, plot.style():
+        figure, panels = plot.new_panels(1, 2, 2.8)
+        for number, words in enumerate(("contact that runs in", "contact that stays as it begins")):
+            tables = {f"wear.evolution.{name}": table for name, table in evolution.items()}
+            if number:
+                tables |= {name: [table[0]] * len(table) for name, table in tables.items() if "energy" not in name}
+            path = Path(folder) / f"worn_{number}.nc"
+            worn = {"scene.worn.cycle": run_study("running_in", path, overrides=tables)["cycle"].values.tolist()}
+            worn |= {"scene.worn.result": str(path)}
+            modes = run_study("modes", Path(folder) / f"modes_{number}.nc", overrides={**mode, **tables, **worn})
+            modes, look = modes.squeeze(), plot.line_style(number) | {"label": words}
+            print(words, modes[[*names, *(f"{name}_error" for name in names)]].to_dataframe().to_string(), sep="\n")
+            for panel, (name, label) in zip(panels[0], names.items(), strict=True):
+                scale = 1.0 if name == "natural_frequency" else 100.0
+                values, error = scale * modes[name].values, scale * modes[f"{name}_error"].values
+                plot.add_line(panel, 1e-3 * modes["cycle"].values, values, error, **look)
+                panel.set(xlabel="slow time (kcycles)", ylabel=label, xlim=(0.0, None))
+        plot.add_legend(figure)
+        drawing = Drawing("running_in_modes", "", "", figure)
+        png = shrink(drawing.save(Path(folder)).with_suffix(".png").read_bytes(), WIDTH)
+    (FOLDER / "running_in_modes.png").write_bytes(png)
+
+
 def main() -> None:
     names = sys.argv[1:]
     if names == ["time-scales"]:
         draw_time_scales()
+    elif names == ["running-in"]:
+        draw_running_in()
     elif [Path(name).stem for name in names] == ["dovetail"]:
         write_dovetail(*names)
     else:

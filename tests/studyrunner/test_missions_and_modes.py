@@ -324,4 +324,9 @@ def test_the_report_draws_frequency_and_damping(result, path, folder):
     for label, cycle in (("mode 1, cycle 10\N{NO-BREAK SPACE}000", 1e4), ("mode 1, cycle 0", 0)):
         expected = result.damping_ratio.sel(mode=1, cycle=cycle).isel(sweep=0, sample=0).values[[1, 2, 0]]
         np.testing.assert_allclose(drawn[label], expected)
+    # and over the cycles of wear
+    over = {line.get_label(): line.get_xydata() for line in items["damping_ratio_cycle"].figure.axes[0].get_lines()}
+    expected = result.damping_ratio.sel(mode=1, modal_amplitude=1e-3, cycle=[0, 1e4]).isel(sweep=0, sample=0)
+    label = "mode 1, modal amplitude 0.001 m kg^0.5"
+    np.testing.assert_allclose(over[label], np.column_stack([[0.0, 1e4], expected]))
     shown.dataset.close()
