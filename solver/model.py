@@ -152,6 +152,10 @@ class ContactInterface(_ByRows):
         tables = [getattr(self.evolution, name, None) for name in EVOLVING]
         return any(table is not None and bool(np.diff(table, axis=1)[self.rubs].any()) for table in tables)
 
+    def acting(self, energy: FloatArray) -> FloatArray:
+        """Of a dissipated energy (n_contact,) what may change the contact: an error of the rest does not count."""
+        return energy if self.evolves else np.zeros_like(energy)
+
     def _slope(self, name: str) -> FloatArray:
         found = self.evolution and self.evolution.now(name)
         return np.where(self.rubs, found[1], 0.0) if found else np.zeros(self.n_contact)

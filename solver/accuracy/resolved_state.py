@@ -6,6 +6,7 @@ of harmonics, and the events in the period of a state that decide about them.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -45,12 +46,17 @@ waves and impacts are equal."""
 class Estimate:
     """Estimated relative errors of a state: of the first harmonic of the response, and of the total wear rate.
 
-    weight: factor on `wear_rate` in `largest`; less than 1 where almost nothing wears.
+    weight: factor on `wear_rate` in `largest`; less than 1 where almost nothing wears. NaN becomes inf, not known.
     """
 
     response: float
     wear_rate: float
     weight: float = 1.0
+
+    def __post_init__(self) -> None:
+        for name in ("response", "wear_rate"):
+            if math.isnan(getattr(self, name)):
+                object.__setattr__(self, name, math.inf)
 
     @property
     def largest(self) -> float:

@@ -95,6 +95,8 @@ def take_step(
     while True:
         end = problem.attempt(here, length)
         ratio = math.inf if end is None else problem.ratio(here, end, length)
+        # an error that is not known
+        ratio = math.inf if math.isnan(ratio) else ratio
         if end is not None and ratio <= 1.0:
             return end, length * lengths.factor(ratio, accepted=True)
         floor = lengths.rescue if end is None else lengths.shortest

@@ -111,8 +111,8 @@ class MissionProblem:
         number = int(nodes[-1].count + length)
         run_mission = partial(self._mission, here, number, number in self._tested)
         contacts = [block.model.contact for block in self.mission.blocks]
-        # what they have in common but the change with the energy
-        contact = next((each for each in contacts if each.evolves), contacts[0])
+        # what they have in common, and the steepest change with the energy
+        contact = max(contacts, key=lambda each: each.relative_change(np.ones(each.n_contact)))
         step = attempt_step(nodes, int(length), contact, run_mission, SHARE_OF_CAUSE * rtol)
         if isinstance(step, MissionStep):
             return step

@@ -20,7 +20,6 @@ product of the flows of the linearised wear rates of the blocks. By how much it 
 last node is a part of the error of the step.
 """
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -106,10 +105,12 @@ def attempt_step(
     slow_now = energy.ravel(), energy_rates.ravel()
     end = Node(now.count + length, growth.ravel(), rates.ravel(), *slow_now, values, guides)
     ratio = float(error @ area) / most
-    if contact.evolves and length > 1:
+    if length > 1:
         heat = float(slow[1].sum(axis=0) @ area), float(energy.sum(axis=0) @ area)
-        ratio = max(ratio, float(energy_error @ area) / allowed_error(share, *heat, now.count, length))
-    return MissionStep(end, results, math.inf if math.isnan(ratio) else ratio)
+        of_energy = float(contact.acting(energy_error) @ area) / allowed_error(share, *heat, now.count, length)
+        # of numpy: one that is NaN stays NaN
+        ratio = float(np.maximum(ratio, of_energy))
+    return MissionStep(end, results, ratio)
 
 
 def values_of(results: tuple[BlockResult, ...]) -> dict[str, Any]:

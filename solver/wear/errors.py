@@ -187,7 +187,8 @@ def reach_target(
     rate = min(float(rates @ weights) for rates in (both.values["depth_rate"][1], last_rate))
     by_wear = 0.0 if wrong == 0.0 else wrong / rate if rate > 0.0 else math.inf
     apart = abs(other.course.reach(target)[0] - reached)
-    return reached, max(by_wear, DIFFERENCE_SAFETY * apart if math.isfinite(apart) else 0.0) + by_interpolation
+    found = max(by_wear, DIFFERENCE_SAFETY * apart if math.isfinite(apart) else 0.0) + by_interpolation
+    return reached, math.inf if math.isnan(found) else found
 
 
 def _frequency_error(both: Compared, safety: float, known: FloatArray) -> FloatArray:

@@ -61,7 +61,7 @@ def integrate_together(
             history = replace(history, unjudged=history.message)
             rows = np.flatnonzero(np.isfinite(history.worn_volume))
             outcome, message = judge(history, rows, settings.rtol)
-            lag = describe_lag(model, history, rows) if model.contact.evolves else ""
+            lag = describe_lag(model, history, rows)
             history = replace(history, outcome=outcome, message="; ".join(filter(None, (message, lag))))
         yield history
 
@@ -74,10 +74,13 @@ def describe_lag(model: ReducedModel, history: WearHistory, rows: IntArray) -> s
     cycles at the last rate are missing. n: within which a vibration of the stuck structure falls to 1/e, by its mode
     next to the frequency; slip damps more, so that it is less. rows: known counts.
     """
-    linear, last = model.harmonic_structure(1), rows[-1:]
+    last = rows[-1:]
+    if not last.size or model.contact.relative_change(history.dissipated_energy[last[0]]) == 0.0:
+        return ""
+    linear = model.harmonic_structure(1)
     inner = np.setdiff1d(np.arange(len(linear.mass)), model.contact.dofs)
     mass, stiffness, damping = (each[np.ix_(inner, inner)] for each in (linear.mass, linear.stiffness, linear.damping))
-    if not inner.size or not last.size or not (volume := float(history.worn_volume[last[0]])) > 0.0:
+    if not inner.size or not (volume := float(history.worn_volume[last[0]])) > 0.0:
         return ""
     omega = 2.0 * math.pi * float(history.excitation_frequency[last[0]])
     squares, modes = scipy.linalg.eigh(stiffness, mass)

@@ -227,9 +227,9 @@ class WearProblem(WearingJoint):
         (before, heat), (after, more_heat) = ((each.at.slow @ self.area).tolist() for each in (state, end))
         rtol = self.case.settings.rtol if self.guide is None else RTOL_RATIO * self.case.settings.rtol
         made = (before, after, end.last.error), (heat, more_heat, end.last.heat_error)
-        ratio = max(
-            error / allowed_error(SMALL_SHARE * rtol, first, last, state.cycle, length) for first, last, error in made
-        )
+        allowed = [allowed_error(SMALL_SHARE * rtol, first, last, state.cycle, length) for first, last, _ in made]
+        # of numpy: one that is NaN stays NaN
+        ratio = float(np.max([error / most for (*_, error), most in zip(made, allowed, strict=True)]))
         smooth = length <= self._shortest(state) and vibration_change(state.at, end.at) < SMOOTH_CHANGE
         return min(ratio, 1.0) if smooth else ratio
 

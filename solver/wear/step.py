@@ -68,8 +68,8 @@ def attempt_step(wearing: WearingJoint, state: WearState, length: float, scheme:
         explicit = now + (1.0 + w) * length * rate - w**2 * grown
         own, other = (1.0 + w) ** 2 / (6.0 * w * (1.0 + 2.0 * w)), (1.0 + 1.0 / w) / 6.0
         error = own / (own + other) * (end.at.slow - explicit)
-    worn, heat = (float(each @ wearing.area) for each in np.abs(error))
-    last = LastStep(state.point, length, worn, heat if wearing.case.model.contact.evolves else 0.0)
+    counted = np.abs(error[0]), wearing.case.model.contact.acting(np.abs(error[1]))
+    last = LastStep(state.point, length, *(float(each @ wearing.area) for each in counted))
     return replace(end, cycle=state.cycle + length, last=last)
 
 

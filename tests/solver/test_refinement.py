@@ -140,6 +140,11 @@ def test_a_state_that_is_the_same_both_ways_goes_on_without_even_harmonics():
     assert whole.response() == pytest.approx(found.response(), rel=1e-6)
 
 
+def test_an_error_that_is_no_number_is_not_known():
+    assert Estimate(0.1, float("nan")).largest == float("inf")
+    assert Estimate(0.1, 0.1).larger(Estimate(float("nan"), 0.2)) == Estimate(float("inf"), 0.2)
+
+
 def test_a_stuck_state_keeps_the_first_harmonic_alone():
     level = started(random_model(1), 0.4, OMEGA, 1e-2, SolverSettings())
     # the second solve starts from where the first one slipped to: everything sticks

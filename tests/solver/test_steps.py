@@ -119,6 +119,18 @@ def test_a_longer_step_goes_across_corners_at_which_every_short_one_ends(monkeyp
         assert found.last.error > 0.0
 
 
+def test_a_step_whose_error_is_not_known_is_refused(monkeypatch):
+    usual, attempt = np.diff(read(states_of(None, 6))[0]), control.attempt_step
+    longest = 0.5 * usual.max()
+
+    def unsure(wearing, state, length, scheme):
+        end = attempt(wearing, state, length, scheme)
+        return end if length <= longest else replace(end, last=replace(end.last, heat_error=np.nan))
+
+    monkeypatch.setattr(control, "attempt_step", unsure)
+    assert np.diff(read(states_of(None, 6))[0]).max() <= longest
+
+
 def test_a_given_step_that_is_not_found_is_shortened_and_later_ones_end_at_multiples_again(monkeypatch):
     tried = failing(monkeypatch, lambda tried: len(tried) == 1)
     states = states_of(Given(4000.0), 6)
