@@ -5,6 +5,7 @@ Importing this module gives every `xarray.Dataset` read from a result file the a
 
 import math
 from collections.abc import Mapping, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,10 @@ import xarray as xr
 
 from solver.outcome import Outcome
 from studyrunner.coordinates import OF_SCENE
+from studyrunner.measured import MeasuredSection, read_measured
 from studyrunner.result.opening import ENDED, kind_of, outcome_words
 from studyrunner.result.pairs import find_grid
+from studyrunner.statistics.identification import CONFIDENCE, identify
 from studyrunner.statistics.study_statistics import worn_volume_statistics
 from studyrunner.study.text import read_toml
 from studyrunner.summary.answer import Summary, summary
@@ -94,6 +97,15 @@ class FretwearAccessor:
     ) -> xr.Dataset:
         """`studyrunner.statistics.study_statistics.worn_volume_statistics` of this dataset. ValueError: no samples."""
         return worn_volume_statistics(self._dataset, quantiles, confidence, exceed, depth, limits)
+
+    def identify(self, measured: Mapping[str, object] | None = None, confidence: float = CONFIDENCE) -> xr.Dataset:
+        """`studyrunner.statistics.identification.identify` of this dataset: inputs by what was measured. measured: as
+        the table [measured] of a study, with numbers or paths of files. ValueError: as there, or a number is wrong.
+        """
+        section = None
+        if measured is not None:
+            section = MeasuredSection.model_validate(read_measured(measured, "identify", Path()), strict=False)
+        return identify(self._dataset, section, confidence)
 
     def flank(self, name: str, surface: str) -> xr.DataArray:
         """Variable `name` of the pairs of one surface, on the grid in which they lie.

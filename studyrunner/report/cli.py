@@ -89,12 +89,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def _report(options: argparse.Namespace) -> int:
     # Loaded late: help and mistakes on the command line do not wait for the libraries that draw.
     began = time.monotonic()
+    from studyrunner.measured import read_profile
     from studyrunner.report.contents import draw_report
     from studyrunner.report.drawing import COLUMN_WIDTH, WIDTH
     from studyrunner.report.page import write_page
     from studyrunner.report.root import SERIES, find_writer
     from studyrunner.result.opening import reading_errors
-    from studyrunner.result.profile import read_profile
     from studyrunner.result.view import open_for_report
     from studyrunner.system.progress import count, format_seconds
 

@@ -7,7 +7,7 @@ from typing import Any
 from studyrunner.kinds.table import KINDS
 from studyrunner.report import drawing as plot
 from studyrunner.report.drawing import Drawing, Drawn, Item, Missing, Table, as_sentences
-from studyrunner.report.figures import pairs, points, root, samples, wear
+from studyrunner.report.figures import measured, pairs, points, root, samples, wear
 from studyrunner.report.selection import course_axis
 from studyrunner.result.pairs import OF_PAIRS, of_shown_scene
 from studyrunner.result.view import Result
@@ -116,6 +116,13 @@ OF_POINTS = (
     Entry("worn_profile", "Worn profile of the contact surfaces", pairs.draw_profile, caption=_BOTH, **ONE),
 )
 """Of results with a slow time: points and pairs."""
+
+_MEASURED = "Bars: standard deviations of what was measured. Bands: numerical errors, of samples from 5 to 95 %"
+OF_MEASURED = (
+    Entry("measured", "Computed and measured", measured.draw_measured, caption=_MEASURED),
+    Entry("identified", "Inputs, as drawn and with what was measured", measured.draw_identified),
+)
+"""Of results with [measured]."""
 
 NUMBERS = Entry("pair_numbers", "Numbers of the contact pairs", pairs.draw_numbers, scene=OF_PAIRS)
 OUTCOMES = Entry("outcome_map", "How the points ended", points.draw_outcomes, always=True)

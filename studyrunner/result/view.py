@@ -13,10 +13,10 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from solver.outcome import COMPLETE, SENSITIVE_ERROR, Outcome
-from studyrunner.coordinates import POINT
+from studyrunner.coordinates import POINT, SAMPLE
 from studyrunner.kinds.kind import Kind
+from studyrunner.measured import MeasuredSection, Profile
 from studyrunner.result.opening import ENDED, as_history, kind_of, open_known, study_tables
-from studyrunner.result.profile import Profile
 from studyrunner.statistics.study_statistics import statistics_of_file
 from studyrunner.units import show_cycles, show_value
 from studyrunner.user_error import UserError
@@ -57,6 +57,18 @@ class Result:
     def study(self) -> dict[str, dict[str, object]]:
         """The effective study in the file, by table; empty where there is none that can be read."""
         return study_tables(self.dataset.attrs)
+
+    @cached_property
+    def measurements(self) -> MeasuredSection | None:
+        """[measured] of the study; None where nothing was measured."""
+        given = self.study.get("measured")
+        section = MeasuredSection.model_validate(given, strict=False) if given else None
+        return section if section and section.all else None
+
+    def at_one_point(self, *kept: str) -> xr.Dataset:
+        """The result at the shown point, with all samples, and all values of the axes `kept`."""
+        left = (SAMPLE, *kept)
+        return self.dataset.isel({name: [index] for name, index in self.shown.items() if name not in left})
 
     @cached_property
     def axes(self) -> tuple[str, ...]:

@@ -132,7 +132,19 @@ def key_list() -> str:
     lines = []
     of_kinds = {kind.table: kind.part("rules").TABLE for kind in KINDS.values() if kind.table}
     tables: dict[str, type[Section]] = {**SECTIONS, "scene": SceneSection, **of_kinds}
-    order = ("study", "scene", "axes", "wear", "slow_time", "solver", "outputs", "loading", "scatter", *of_kinds)
+    order = (
+        "study",
+        "scene",
+        "axes",
+        "wear",
+        "slow_time",
+        "solver",
+        "outputs",
+        "loading",
+        "scatter",
+        "measured",
+        *of_kinds,
+    )
     for table in order:
         for key, default, meaning in _keys(table, tables[table]):
             shown = f"`{table}.{key} = {default}`" if default else f"`{table}.{key}`"

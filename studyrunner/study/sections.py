@@ -9,6 +9,7 @@ from pydantic import AfterValidator, Field
 from solver.contact.wear_law import PowerTerms, WearLaw, WearTable
 from solver.settings import TARGETS, Followed
 from studies.scene import LARGEST_FRICTION, Unit
+from studyrunner.measured import MeasuredSection
 from studyrunner.scatter import ScatterSection
 from studyrunner.values import Axis, Fraction, Listed, NotNegative, Positive, Section, Whole, Wrong, ascending, once
 
@@ -292,4 +293,5 @@ SECTIONS: dict[str, type[Section]] = {
     "outputs": OutputsSection,
     "scatter": ScatterSection,
     "loading": LoadingSection,
+    "measured": MeasuredSection,
 }

@@ -12,6 +12,7 @@ from solver.settings import TARGETS, FollowedFrequency, WearTarget
 from studyrunner.coordinates import POINT, SAMPLE, SCENE
 from studyrunner.kinds.kind import Kind
 from studyrunner.kinds.wear.kind import ALLOWED, COUNTS, LOOPS
+from studyrunner.measured import MeasuredSection
 from studyrunner.scatter import ScatterSection
 from studyrunner.study import sections
 from studyrunner.study.design import Design
@@ -46,6 +47,7 @@ class Study(Section):
     outputs: sections.OutputsSection = sections.OutputsSection()
     scatter: ScatterSection | None = None
     loading: sections.LoadingSection | None = None
+    measured: MeasuredSection | None = None
     tables: dict[str, Any] = Field({}, description="of its kind alone")
     kind: InstanceOf[Kind] = Field(exclude=True)
     block_studies: tuple["Study", ...] = Field((), exclude=True)
@@ -94,8 +96,9 @@ class Study(Section):
     def files(self) -> tuple[Path, ...]:
         """Files that a run of the study reads."""
         worn = self.scene.worn.result if self.scene.worn else ""
-        own = self.folder / Path(self.source).name
-        return (own, *self.scene.source.files, *([self.folder / worn] if worn else ()))
+        own, measured = self.folder / Path(self.source).name, self.measured.all if self.measured else ()
+        names = [worn, *(each.file for _, each in measured)]
+        return (own, *self.scene.source.files, *(self.folder / name for name in names if name))
 
     @property
     def friction_coefficient(self) -> float | None:

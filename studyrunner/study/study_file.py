@@ -15,6 +15,7 @@ from studies.hdf5 import is_hdf5
 from studyrunner.coordinates import COORDINATES, SCENE
 from studyrunner.kinds.table import KINDS
 from studyrunner.kinds.wear.kind import FOLLOWED_FREQUENCY, OF_EVOLUTION
+from studyrunner.measured import read_measured
 from studyrunner.scatter import flat_table
 from studyrunner.study import scene_axes, sections
 from studyrunner.study.design import Design, read_archived_design, read_design
@@ -28,7 +29,7 @@ from studyrunner.study.text import SCENE_GROUP, format_toml, read_archived, read
 from studyrunner.user_error import UserError, Verbatim
 from studyrunner.values import listed
 
-_ON_REQUEST = ("scatter", "loading")
+_ON_REQUEST = ("scatter", "loading", "measured")
 
 
 def read_study(study: str | Path, overrides: Sequence[str] | Mapping[str, object] = (), points: object = None) -> Study:
@@ -141,6 +142,8 @@ def _check_study(table: Mapping[str, object], origin: Origin, design: Design | N
         remedy = f"leave it out, or {others[0].marker}: a study is of {kind.words} or of {others[0].words}"
         raise UserError(source, kind.marker, None, remedy)
     worn = None if worn is None else read_worn(worn, source, origin.path.parent)
+    if "measured" in tables:
+        tables["measured"] = read_measured(tables["measured"], source, origin.path.parent)
     solver_axes = tuple(key for key in sections.SOLVER_AXES if key in tables["axes"])
     axes = scene_axes.take_axes(tables, parameters, source, design)
     of_kind: dict[str, Any] = {}

@@ -18,6 +18,7 @@ from studyrunner.result.opening import as_history, describe_outcome
 from studyrunner.result.pairs import contact_pairs
 from studyrunner.result.view import Result
 from studyrunner.summary.findings import LEAST_ERROR, Finding, where_is
+from studyrunner.summary.measured import about_measured
 from studyrunner.system.progress import count
 from studyrunner.units import scale_for, show_number, show_percent, show_rtol
 
@@ -103,6 +104,7 @@ def summarise(result: Result) -> Summary:
     findings, doubts = [*result.kind.part("findings").what_came_out(result, resonance)], list[str]()
     if result.kind.counted:
         doubts += [_not_small(result), _too_far(result), _too_few_counts(result)]
+    findings += about_measured(result)
     wore = not any(each.name == "wear" and each.values.get("worn_volume") == 0.0 for each in findings)
     findings += [*(Finding("doubt", "beware", doubt) for doubt in doubts if doubt), *_failures(result)]
     findings += _faster_than_metals(result)

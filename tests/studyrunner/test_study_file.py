@@ -157,13 +157,15 @@ EXAMPLES = [
 
 @pytest.mark.parametrize("text", EXAMPLES)
 def test_every_example_is_a_study(text, capsys):
-    # what the examples name: a result, a scene file, decks, reduced matrices
+    # what the examples name: a result, a scene file, decks, reduced matrices, measurements
     write_depths("dovetail.nc", 211.5, [0.0, 1e4, 5e4, 1e5], 24)
     assert main(["sdof_slider", "--write-scene", "my_root.h5"]) == 0
     for deck in (SECTOR, ROOT / "studies" / "blade_root.inp"):
         shutil.copy(deck, deck.name.removeprefix("calculix_"))
     for name in ("nodes.csv", "blade.pch", "stress.csv"):
         Path(name).touch()
+    Path("worn.csv").write_text("cycle,worn_volume_mm3\n1e4,0.1\n", encoding="utf-8")
+    Path("scar.csv").write_text("x_mm,depth_um\n" + "".join(f"{x},1\n" for x in range(5)), encoding="utf-8")
     table = read_toml(text.encode(), "page")
     complete = {"study", "scene"} <= table.keys() and table.keys() & {"axes", "mission"}
     given = {"study": {"name": "s"}, "scene": {"model": "dovetail_sector"}, "axes": {}}

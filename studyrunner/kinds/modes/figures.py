@@ -3,7 +3,7 @@
 import numpy as np
 
 from studyrunner.report import drawing as plot
-from studyrunner.report.contents import BARS, NUMBERS, ONE, OUTCOMES, Entry
+from studyrunner.report.contents import BARS, NUMBERS, OF_MEASURED, ONE, OUTCOMES, Entry
 from studyrunner.report.drawing import Drawn
 from studyrunner.report.figures.root import draw_fraction
 from studyrunner.report.selection import find_course
@@ -44,6 +44,7 @@ FIGURES = (
         for end, axis, words in (("", "modal_amplitude", "its amplitude"), ("_cycle", "cycle", "the cycles of wear"))
         for name, of in (("natural_frequency", "Natural frequency"), ("damping_ratio", "Damping ratio"))
     ),
+    *OF_MEASURED,
     *(
         Entry(f"{of}_fraction", f"Where the joint {of}s", draw_fraction, f"{of}_fraction", (f"{of}_fraction",), **ONE)
         for of in ("slip", "open")

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from studies.scene import SurfaceMesh
+from studyrunner.measured import read_profile
 from studyrunner.report.contents import draw_report
 from studyrunner.report.page import build_page_data, build_root_numbers
 from studyrunner.report.root import find_writer, read_root
 from studyrunner.result.opening import check_dataset
 from studyrunner.result.pairs import find_flanks, last_depth, of_shown_scene
-from studyrunner.result.profile import read_profile
 from studyrunner.result.view import Result
 from studyrunner.user_error import UserError
 from tests.studyrunner.report.cases import draw_figure, with_mesh
