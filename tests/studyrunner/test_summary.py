@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from solver.outcome import Outcome
-from studyrunner.kinds.wear.findings import compare_meshes
+from studyrunner.kinds.wear.meshes import compare_meshes, converge
 from studyrunner.report.page import _facts as page_facts
 from studyrunner.result.opening import as_history
 from studyrunner.result.view import Result
@@ -337,6 +337,27 @@ def test_meshes_are_compared_at_the_resonance_alone():
     # at one frequency they would be at two distances to the resonance
     assert meshed({2: [2.0, 1.0], 3: [1.0, 1.1]}, "axes.frequency=211.5", "axes.scheme=adaptive") is None
     assert compare_meshes(result_of(wearing("axes.frequency=1"))) is None
+
+
+def test_the_observed_order_is_that_of_the_values():
+    """Richardson's extrapolation of v + c h^p is exact, with any ratios; what oscillates has no order."""
+    sizes = np.array([1.0, 0.6, 0.25])
+    for order in (0.7, 1.0, 2.0, 3.1):
+        found = converge(sizes, 2.0 - 0.3 * sizes**order)
+        assert found.order == pytest.approx(order, rel=1e-9)
+        assert found.limit == pytest.approx(2.0, rel=1e-9)
+        true = 0.3 * sizes[2] ** order / (2.0 - 0.3 * sizes[2] ** order)
+        assert found.u_mesh == pytest.approx(1.25 / 1.15 * true, rel=1e-8)
+    for values in ([1.0, 1.2, 1.1], [1.0, 1.1, 1.3], [1.0, 1.0, 1.0], [1.0, np.nan, 1.2], [1.0, 2.0, 2.0 + 1e-9]):
+        assert converge(sizes, np.array(values)).u_mesh == float("inf")
+
+
+def test_of_three_meshes_the_uncertainty_is_told():
+    found = meshed({2: [1.0, 1.0], 4: [1.3, 1.2], 8: [1.4, 1.1]})
+    assert found.values["order"] == pytest.approx(np.log2(3.0))
+    assert found.values["u_mesh"] == float("inf")
+    assert "u_mesh 3.9 % by the observed order 1.6, 1 point without an order" in found.text
+    assert "no order of convergence" in meshed({2: [1.0, 1.0], 3: [1.2, 1.2], 4: [1.1, 1.1]}).text
 
 
 # --- values that are hardly what was meant ---

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from solver.outcome import SENSITIVE_ERROR, Outcome, absolute
 from studyrunner.coordinates import SAMPLE
+from studyrunner.kinds.wear.meshes import compare_meshes
 from studyrunner.kinds.wear.sought import find_allowable
 from studyrunner.result.pairs import contact_pairs, has_depths, last_depth
 from studyrunner.result.view import NO_MOTION, NO_VOLUME, Point, Result
@@ -19,7 +20,7 @@ from studyrunner.statistics.study_statistics import LIFE, QUANTITIES
 from studyrunner.study.scene_section import WORN_AXIS, worn_before
 from studyrunner.summary.findings import LEAST_ERROR, Finding, show, where_is, with_error
 from studyrunner.system.progress import count
-from studyrunner.units import show_cycles, show_known, show_number, show_percent
+from studyrunner.units import show_cycles, show_known, show_percent
 
 _MOST_ALIKE = 3
 _AFTER_THE_START = ("excitation_amplitude", "wear_coefficient", "step", "scheme")  # what slip does not depend on
@@ -329,26 +330,3 @@ def _shortest_life(result: Result) -> Finding | None:
     text += f"; {unsure}" if unsure else ""
     text += f"; not reached by {count(n_beyond, 'point')}" if n_beyond else ""
     return Finding("life", "life", text, values | {"count": life, "error": error, "point": point})
-
-
-def compare_meshes(result: Result) -> Finding | None:
-    """How far worn volumes of the two finest meshes are apart, at equal distance to the resonance; else None.
-
-    The resonance moves with the mesh: at one frequency one mesh may wear a multiple of the other.
-    """
-    at = f"at the {result.followed}" if result.followed else ""
-    at = at or ("at equal frequency ratio" if "frequency_ratio" in result.axes else "")
-    if not at or "mesh" not in result.varying or not result.wears or not result.has("worn_volume"):
-        return None
-    meshes, axis = result.dataset["mesh"].values.astype(float), result.axes.index("mesh")
-    two = np.argsort(meshes)[-2:]
-    volumes = np.where(result.best_known, result.worn, np.nan).take(two, axis=axis)
-    larger = np.fmax.reduce(volumes, axis=axis)
-    apart = np.abs(np.diff(volumes, axis=axis).squeeze(axis)) / np.where(larger > NO_VOLUME, larger, np.nan)
-    if np.isnan(apart).all():
-        return None
-    median, largest = float(np.nanmedian(apart)), float(np.nanmax(apart))
-    coarse, fine = (show_number(each) for each in meshes[two].tolist())
-    text = f"worn volumes of meshes {coarse} and {fine} differ by {show_percent(median)} {at}"
-    text += f", at most {show_percent(largest)}" if largest > median else ""
-    return Finding("mesh", "mesh", text, {"meshes": meshes[two].tolist(), "median": median, "largest": largest})
