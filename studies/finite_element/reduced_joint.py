@@ -87,6 +87,10 @@ def prepare_model(model: FeModel, joint: JointDefinition, progress: Progress = s
         solid_mesh.check_elements(mesh)
         forms = {"stiffness": solid_mesh.assemble_stiffness(mesh), "mass": solid_mesh.assemble_mass(mesh)}
     mass, placed = forms["mass"], ~np.isnan(mesh.coordinates)
+    # springs between each mass and the ground: all modes keep their shapes
+    springs = (2.0 * np.pi * model.suspension) ** 2 * mass
+    if model.suspension > 0.0:
+        forms = {**forms, "stiffness": (forms["stiffness"] + springs).tocsr()}
     load = np.zeros(mass.shape[0]) if model.preload is None else model.preload
     if model.gravity is not None:
         load = load + mass @ (placed * model.gravity).ravel()
@@ -104,7 +108,7 @@ def prepare_model(model: FeModel, joint: JointDefinition, progress: Progress = s
     displacements = prepared.solve_static(spin)
     progress("assembly of the prestressed stiffness")
     stressed = solid_mesh.assemble_tangent_stiffness(mesh, displacements)
-    stiffness = (stressed + solid_mesh.spin_softening(mass, rotation)).tocsr()
+    stiffness = (stressed + solid_mesh.spin_softening(mass, rotation) + springs).tocsr()
     return replace(prepared, forms={"stiffness": stiffness, "mass": mass, "elastic": forms["stiffness"]})
 
 

@@ -143,7 +143,7 @@ class PreparedModel:
             digits = ", as far as the digits of the matrices tell" if self.rounding else ""
             found = f"{at} nothing holds the glued structure: its stiffness is singular{digits}"
             more = ", or write the matrices with more digits" if self.rounding else ""
-            remedy = f"clamp nodes, or hang a free body on soft elements{more}"
+            remedy = f"clamp nodes, or give a free body a `suspension`, Hz{more}"
             raise SceneError("clamp", found, f"{remedy}: with all pairs glued none may move freely") from error
 
 

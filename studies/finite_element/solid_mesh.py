@@ -108,7 +108,9 @@ def check_elements(mesh: SolidMesh) -> None:
         kind = ELEMENT_KINDS[group.kind]
         if not kind.assembled:
             found = f"element {group.numbers[0]} is a {group.kind}, whose matrices depend on the program"
-            raise SceneError("model", found, f"give matrices, or use one of {', '.join(ASSEMBLED_KINDS)}")
+            alike = [each for each in ASSEMBLED_KINDS if ELEMENT_KINDS[each].reference is kind.reference]
+            read = f'read_as = {{{group.kind} = "{alike[-1]}"}}, '
+            raise SceneError("model", found, f"give {read}matrices, or use one of {', '.join(ASSEMBLED_KINDS)}")
         for chosen in _batches(group):
             wrong = np.flatnonzero(~(volumes_of_points(kind, mesh.coordinates[group.nodes[chosen]]).min(axis=1) > 0.0))
             if len(wrong):

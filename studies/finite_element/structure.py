@@ -32,6 +32,7 @@ class FeModel:
     acceleration of all mass, m/s2; no part of the prestress, as forces on gaps act otherwise on a glued structure.
     forms: "stiffness", N/m, "mass", kg, and where there is one "damping", N s/m, of another program, with their
     prestress and spin softening, (3 n_nodes, 3 n_nodes), symmetric and unconstrained; None: they are assembled here.
+    suspension: frequency, Hz, of the rigid motions of a free structure, on springs in proportion to its mass.
     """
 
     mesh: SolidMesh
@@ -40,6 +41,7 @@ class FeModel:
     preload: FloatArray | None = None
     gravity: FloatArray | None = None
     forms: Mapping[str, sparse.csr_matrix] | None = None
+    suspension: float = 0.0
 
 
 def mean_motion(nodes: IntArray, direction: FloatArray, n_nodes: int) -> FloatArray:

@@ -141,7 +141,7 @@ def load_model(files: ModelFiles, parameters: Parameters, progress: Progress = s
         if files.recovery is not None:
             responses |= read_recovery(files.recovery, imported, units, responses)
     whole = nodes.with_nodes(supported.extra)
-    model = FeModel(whole, rotation, parameters.stress_stiffening, preload, gravity, forms)
+    model = FeModel(whole, rotation, parameters.stress_stiffening, preload, gravity, forms, parameters.suspension)
     joint = JointDefinition(
         contacts=contacts,
         held=supported.held,

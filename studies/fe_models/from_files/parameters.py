@@ -102,6 +102,12 @@ class Parameters(Table):
     clamp: Names | None = Field(
         None, description="sets of nodes or surfaces that are held, [name]; default: the deck's BOUNDARY"
     )
+    read_as: dict[str, str] | None = Field(
+        None, description='kinds of elements in place of others with as many nodes, {C3D8R = "C3D8I"}'
+    )
+    suspension: Annotated[float, Unit("Hz")] = Field(
+        0.0, ge=0, description="frequency of the rigid motions of a free structure, on soft springs to the ground"
+    )
     material: MaterialTable | dict[str, MaterialTable] | None = Field(
         None, description="of all elements, or by the name of a set of elements"
     )

@@ -11,6 +11,7 @@ from studies.fe_models.deck.contents import Deck
 from studies.fe_models.files import Units
 from studies.fe_models.from_files.parameters import MaterialTable, Parameters
 from studies.finite_element.cut_faces import CyclicAxis
+from studies.finite_element.elements import ASSEMBLED_KINDS, ELEMENT_KINDS
 from studies.finite_element.solid_mesh import ElementGroup, Material, Rotation, SolidMesh
 from studies.scene_error import SceneError
 
@@ -36,6 +37,7 @@ def build_solid_mesh(deck: Deck, parameters: Parameters, units: Units) -> SolidM
         return SolidMesh(deck.coordinates * units.length, deck.node_numbers, ())
     if not deck.blocks:
         raise SceneError("model", f"{deck.path} has no solid elements", "give a deck with the mesh")
+    read_as = _read_as(deck, parameters)
     numbers = np.unique(np.concatenate([block.nodes.ravel() for block in deck.blocks]))
     coordinates = deck.coordinates[deck.rows_of_nodes(numbers)] * units.length
     materials = list(_materials(deck, parameters, units))
@@ -47,13 +49,30 @@ def build_solid_mesh(deck: Deck, parameters: Parameters, units: Units) -> SolidM
             own = left & np.isin(block.numbers, elements)
             if own.any():
                 nodes = np.searchsorted(numbers, block.nodes[own]).astype(np.int64)
-                groups.append(ElementGroup(block.kind, nodes, block.numbers[own], material, name))
+                kind = read_as.get(block.kind, block.kind)
+                groups.append(ElementGroup(kind, nodes, block.numbers[own], material, name))
             left &= ~own
         if left.any():
             found = f"{np.count_nonzero(left)} elements of {deck.path} have none, as element {block.numbers[left][0]}"
             remedy = "give *SOLID SECTION with *ELASTIC and *DENSITY in the deck, or `material` in the study"
             raise SceneError("material", found, remedy)
     return SolidMesh(coordinates, numbers, tuple(groups))
+
+
+def _read_as(deck: Deck, parameters: Parameters) -> dict[str, str]:
+    """Kinds of elements in place of those of the deck. Raises SceneError where they have other nodes."""
+    found, own = dict[str, str](), {block.kind for block in deck.blocks}
+    for name, given in (parameters.read_as or {}).items():
+        kind, other = name.strip().upper(), given.strip().upper()
+        if kind not in own:
+            raise SceneError("read_as", f"{deck.path} has no element {kind}", f"give one of {', '.join(sorted(own))}")
+        nodes = len(ELEMENT_KINDS[kind].reference.corners) + len(ELEMENT_KINDS[kind].reference.edges)
+        alike = [each for each in ASSEMBLED_KINDS if ELEMENT_KINDS[each].reference is ELEMENT_KINDS[kind].reference]
+        if other not in alike:
+            remedy = f"give one with the same {nodes} nodes: {', '.join(alike)}"
+            raise SceneError("read_as", f"{kind} is not read as {other}", remedy)
+        found[kind] = other
+    return found
 
 
 def _materials(deck: Deck, parameters: Parameters, units: Units) -> Iterator[tuple[str, IntArray, Material]]:

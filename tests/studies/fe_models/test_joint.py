@@ -12,6 +12,7 @@ from studies.finite_element.elements import ELEMENT_KINDS
 from studies.finite_element.pairing import ContactSurfaces, build_contact_pairs
 from studies.finite_element.solid_mesh import rigid_motions
 from studies.scene_error import SceneError
+from tests.studies.fe_models.decks import BLOCKS, prepared_deck
 from tests.studies.fe_models.sectors import N_SECTORS, Sector, Z, cubes_on_each_other, faces_where, surface_where
 from tests.studies.fe_models.solid_meshes import block, joined
 
@@ -167,3 +168,35 @@ def test_wrong_cut_faces_are_named():
     coordinates[sector.left[2]] += [1e-3, 0.0, 0.0]
     with pytest.raises(SceneError, match=f"1 nodes .*: {mesh.numbers[sector.left[2]]}"):
         match_cut_faces(replace(mesh, coordinates=coordinates), axis, sector.left, sector.right)
+
+
+# --- free structures, and elements that are read as others ---
+
+FREE = BLOCKS.partition("*BOUNDARY")[0]
+
+
+def glued(folder, text, n=9, **given):
+    return prepared_deck(folder, text, **given)[0].frequencies(0, n)
+
+
+def test_a_free_structure_hangs_on_soft_springs(tmp_path):
+    """Six rigid motions at the frequency of the suspension; the squares of all others rise by its square."""
+    soft, stiff = (glued(tmp_path, FREE, suspension=each) for each in (2.0, 2000.0))
+    assert soft[:6] == pytest.approx(np.full(6, 2.0), rel=1e-4)
+    assert stiff[:6] == pytest.approx(np.full(6, 2000.0), rel=1e-6)
+    assert soft[6] > 1e3
+    assert stiff[6:] ** 2 - soft[6:] ** 2 == pytest.approx(np.full(3, 2000.0**2 - 2.0**2), rel=1e-3)
+    with pytest.raises(SceneError, match="a `suspension`"):
+        glued(tmp_path, FREE)
+
+
+def test_elements_are_read_as_others_with_as_many_nodes(tmp_path):
+    asked = FREE.replace("TYPE=C3D8,", "TYPE=C3D8R,")
+    with pytest.raises(SceneError, match=r'C3D8R, whose matrices depend on the program.*read_as = \{C3D8R = "C3D8I"\}'):
+        glued(tmp_path, asked, suspension=2.0)
+    found = glued(tmp_path, asked, suspension=2.0, read_as={"C3D8R": "C3D8I"})
+    expected = glued(tmp_path, FREE.replace("TYPE=C3D8,", "TYPE=C3D8I,"), suspension=2.0)
+    assert found == pytest.approx(expected, rel=1e-12)
+    for given, words in (({"C3D8R": "C3D4"}, "same 8 nodes"), ({"C3D20": "C3D20R"}, "has no element C3D20")):
+        with pytest.raises(SceneError, match=words):
+            glued(tmp_path, asked, suspension=2.0, read_as=given)
