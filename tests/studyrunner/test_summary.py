@@ -284,6 +284,14 @@ def test_points_that_failed_or_were_never_estimated_are_not_known():
     assert [each.name for each in failures] == ["march_failed", "inaccurate", "others"]
 
 
+def test_points_that_a_run_has_not_come_to_have_not_failed():
+    outcomes = {(1, 0): int(Outcome.NOT_COMPUTED), (2, 0): int(Outcome.NOT_COMPUTED), (2, 1): FAILED}
+    rows = summary(wearing(*GRID, outcome=lambda p: outcomes.get(at(p), 0))).rows
+    (left,) = (text for label, text in rows if label == "to do")
+    assert left == "2 of 9 points: The run ended before this point was computed. The same command continues"
+    assert [text[:11] for label, text in rows if label == "failed"] == ["1 of 9 poin"]
+
+
 def test_the_summary_is_short_whatever_came_out():
     outcomes = [int(each) for each in Outcome]
     made = wearing(
