@@ -121,8 +121,9 @@ def _of_effort(
     yield from zip(("left out", *[""] * (len(left_out) - 1)), left_out, strict=True)
     whole, longest = effort.seconds, effort.longest
     one, two, most = (format_seconds(prepared_in + each) for each in (whole, max(longest, whole / 2.0), longest))
+    longer = "; a contact that changes takes up to three times as long" if study.evolving else ""
     earlier = ", less where points end at their target" if study.slow_time.until and not study.allowable else ""
-    yield "time", f"about {one} on one rank, {two} on two, {most} on many, {study.kind.time}{earlier}"
+    yield "time", f"about {one} on one rank, {two} on two, {most} on many, {study.kind.time}{longer}{earlier}"
     yield "", f"points at which all pairs stick take next to none; a first run compiles for {COMPILE_SECONDS} s more"
     n_values = plan.n_points * values_of_point(study, facts)
     memory = memory_a_rank(effort.n_unknowns, n_values, is_automatic, built_with) / 1e9

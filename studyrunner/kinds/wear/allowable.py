@@ -67,7 +67,7 @@ class AllowableAmplitude(Task):
 
             sweeps = FrequencySweep(model, amplitude, direction, self.settings, say)
             _, start = next(sweeps.states(frequencies))
-            return next(integrate_together(model, self.settings, start, [asked], report=say))
+            return next(integrate_together(model, self.settings, start, [asked], report=lambda words, *_: say(words)))
 
         def note(tried: "tuple[Tried, ...]") -> None:
             keep(pack(tried))

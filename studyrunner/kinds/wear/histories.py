@@ -17,7 +17,8 @@ from solver.packing import Packed, pack, unpack
 from solver.settings import FollowedFrequency, Resolution, ToTheEnd, WearTarget
 from studyrunner.kinds.joint import TaskJoint
 from studyrunner.kinds.results import deepest, describe_target, first_harmonic, named
-from studyrunner.kinds.task import Identity, Keep, PointResult, StartResult, Task, Work, digest, up_or_down
+from studyrunner.kinds.task import Identity, Keep, Part, PointResult, StartResult, Task, Work, digest, up_or_down
+from studyrunner.kinds.wear.effort import share_done
 from studyrunner.kinds.wear.kind import OF_A_HISTORY, OWN_STEPS
 from studyrunner.kinds.wear.onset import slip_amplitude
 from studyrunner.mpi.dispatch import CostKeys
@@ -244,7 +245,14 @@ class History(_FromRest):
             needed.setdefault(self.results[place][0], []).append(place)
         model, asked = self.joint.model(models), [self.asked(each, self.until) for each in needed]
         start = unpack(self.start)
-        histories = integrate_together(model, self.settings, start, asked, keep, self.resume, keep)
+        first, end = next(iter(needed)), self.cycles[-1]
+
+        def note(words: str, n_complete: int, share: float) -> None:
+            # the first history takes nearly all of the time; to the end of wear nobody knows how far it is
+            done = share_done(first.scheme, first.step, end, n_complete, share)
+            keep(Part(done, f"{words} of {end:g}") if done > 0.0 else words)
+
+        histories = integrate_together(model, self.settings, start, asked, keep, self.resume, note)
         slips = slip_amplitude(start, model)
         for (each, places), history in zip(needed.items(), histories, strict=True):
             for place in places:
