@@ -185,7 +185,7 @@ class StudyRun(TaskHandler):
     def _factor(self, group: tuple[Hashable, ...]) -> float:
         """Measured over estimated times of a group. In full from half of its work on: cheap results come first.
 
-        Until then as much longer as all tasks have taken: where a sweep is hard, or the machine busy, histories are slow.
+        Until then as much longer as all tasks have taken: where sweeps are hard, or the machine busy, so are histories.
         """
         done = self.costs.sums.get(group[-1], (0.0, 0.0, 0))[1]
         known = min(1.0, 2.0 * done / max(done + self._left[group], 1e-9))

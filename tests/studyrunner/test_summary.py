@@ -154,6 +154,19 @@ def test_nothing_wore_says_why():
 # --- the resonance and the life ---
 
 
+def test_a_followed_resonance_that_turns_says_how_far_it_went():
+    """Above both ends by more than its error, below them by less."""
+    study = ("axes.frequency='resonance'", "loading.between=[180, 230]")
+    hertz = np.full(21, 200.0)
+    hertz[[5, 9, 20]] = 203.0, 199.9, 201.0
+    made = wearing(*study, excitation_frequency=lambda _: hertz, excitation_frequency_error=lambda _: np.full(21, 0.25))
+    row = dict(summary(made).rows)["resonance"]
+    assert "moved from 200 to 201 ± 0.25 Hz, highest 203 Hz after 5000 cycles; response" in row
+    assert "scene.worn" in row
+    assert summary(made).values["response"]["between"] == [(203.0, 5000.0)]
+    assert "highest" not in str(summary(made.drop_vars("excitation_frequency_error")))
+
+
 def test_the_peak_of_the_new_joint_lies_between_others():
     for peak, expected in ((1, 211.25), (0, math.nan), (2, math.nan)):
 
