@@ -184,6 +184,11 @@ def doubts_of_study(study: Study, facts: SceneFacts | None = None) -> tuple[str,
     key, value, default = farthest_from_default(study)
     if key and not any(each.startswith(key) for each in found):
         found.append(f"scene.{key} = {value:g} is far from its default, {default:g}: is its unit meant?")
+    if not study.evolving and any(each.scene.worn and each.scene.worn.energy for each in parts):
+        found.append(
+            "scene.worn has dissipated energies, with which friction and stiffness change by [wear.evolution], and this"
+            " study has none: is that meant, or is the [wear.evolution] of the wear study to be repeated?"
+        )
     low, high = (end(own, default=0.0) / (2.0 * math.pi) for end in (min, max))
     if stuck / math.pi < low < 2.0 * stuck and 0.5 * stuck < high:
         found.append(f"frequencies are all far above the first resonance, {stuck:.5g} Hz: are they in rad/s?")

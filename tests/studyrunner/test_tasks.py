@@ -251,6 +251,7 @@ def test_bundled_studies_are_plausible(name):
         ),
         ("dovetail", "slow_time.cycles=1e20", "slow_time.cycles 1e+20 is more than machines live", "meant"),
         ("mission", "mission.0.excitation_amplitude=1e9", "excitation_amplitude 1e+09 N", "in mN"),
+        ("dovetail", "scene.worn={depth=1e-6, energy=1e5}", "scene.worn has dissipated energies", "repeated"),
     ],
 )
 def test_other_units_are_asked_about_once(study, override, start, asked):
