@@ -14,8 +14,8 @@ from solver.results.history import StartState
 from solver.settings import Resolution
 from studyrunner.cli import main
 from studyrunner.kinds.wear.effort import share_done
-from studyrunner.kinds.wear.histories import build_result
 from studyrunner.kinds.wear.kind import ASKED, USUAL
+from studyrunner.kinds.wear.point import build_result
 from studyrunner.plan import doubts_of_study, effort_of
 from studyrunner.study.study_file import bundled_studies, read_study
 from tests.mpi.launching import options, results

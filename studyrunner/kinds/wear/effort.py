@@ -60,7 +60,7 @@ def share_done(scheme: str, step: float, cycles: float, n_complete: int, share: 
     are short at first: half of the time is over after 0.2 to 0.6 of the cycles (dovetail, 16 pairs).
     """
     solutions = _solutions([(scheme, step)], cycles)
-    if share == 0.0 or n_complete >= len(solutions):
+    if n_complete >= len(solutions):
         return 0.0
     now, whole = solutions[n_complete], sum(each.iterations for each in solutions)
     done = sum(each.iterations for each in solutions[:n_complete])
