@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from solver.model import FloatArray, ReducedModel, with_friction
 from solver.outcome import check
-from solver.packing import Keep, Packed
+from solver.packing import Packed
 from solver.settings import Direction, SolverSettings
 
 Progress = Callable[[str], object]
@@ -21,11 +21,11 @@ SECONDS_A_LINE = 2.0
 """Least time between two lines."""
 
 
-def lines_to(progress: Progress | None) -> Keep:
+def lines_to(progress: Progress | None) -> Callable[..., None]:
     """Gives `progress` a line from time to time, of what a computation says."""
     shown_at = time.monotonic()
 
-    def keep(said: Packed | str) -> None:
+    def keep(said: Packed | str, *_: object) -> None:
         nonlocal shown_at
         if progress is not None and isinstance(said, str) and time.monotonic() >= shown_at + SECONDS_A_LINE:
             shown_at = time.monotonic()

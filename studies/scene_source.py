@@ -191,7 +191,7 @@ class SceneFileParameters(Table):
 
     AXES: ClassVar = ("friction_coefficient", "contact_stiffness")
 
-    friction_coefficient: float | None = Field(None, ge=0, description="a number, 0 or more")
+    friction_coefficient: float | None = Field(None, ge=0, description="of all pairs")
     contact_stiffness: ContactStiffness = None
 
 

@@ -79,7 +79,8 @@ class FretwearAccessor:
         if not whole["outcome"].dims:
             whole = _widened(whole, kind.axes[0], list(kind.variables))
         _require(whole, "contact")
-        return summary(whole.transpose(*whole["outcome"].dims, *_SELECTED, ..., missing_dims="ignore"))
+        order = dict.fromkeys((*whole["outcome"].dims, *_SELECTED))
+        return summary(whole.transpose(*order, ..., missing_dims="ignore"))
 
     @property
     def surfaces(self) -> tuple[str, ...]:

@@ -92,9 +92,10 @@ COORDINATES = {
         ("contact",),
         "1",
         "whether the contact pair is at the edge of its surface",
-        "Found from the positions of the pairs of flat surfaces, or given by the scene.",
+        "Found from the positions of the pairs of flat surfaces, or given by the scene. Not known of a surface with so"
+        " few pairs that all lie at its edge, as on the coarsest mesh.",
         dtype="int8",
-        flags=("inside", "edge"),
+        flags=("inside", "edge", "not_known"),
     ),
     "contact_exists": Variable(
         ("contact",),

@@ -121,8 +121,9 @@ def _of_effort(
     yield from zip(("left out", *[""] * (len(left_out) - 1)), left_out, strict=True)
     whole, longest = effort.seconds, effort.longest
     one, two, most = (format_seconds(prepared_in + each) for each in (whole, max(longest, whole / 2.0), longest))
+    longer = "; a contact that changes takes up to three times as long" if study.evolving else ""
     earlier = ", less where points end at their target" if study.slow_time.until and not study.allowable else ""
-    yield "time", f"about {one} on one rank, {two} on two, {most} on many, {study.kind.time}{earlier}"
+    yield "time", f"about {one} on one rank, {two} on two, {most} on many, {study.kind.time}{longer}{earlier}"
     yield "", f"points at which all pairs stick take next to none; a first run compiles for {COMPILE_SECONDS} s more"
     n_values = plan.n_points * values_of_point(study, facts)
     memory = memory_a_rank(effort.n_unknowns, n_values, is_automatic, built_with) / 1e9
@@ -183,6 +184,11 @@ def doubts_of_study(study: Study, facts: SceneFacts | None = None) -> tuple[str,
     key, value, default = farthest_from_default(study)
     if key and not any(each.startswith(key) for each in found):
         found.append(f"scene.{key} = {value:g} is far from its default, {default:g}: is its unit meant?")
+    if not study.evolving and any(each.scene.worn and each.scene.worn.energy for each in parts):
+        found.append(
+            "scene.worn has dissipated energies, with which friction and stiffness change by [wear.evolution], and this"
+            " study has none: is that meant, or is the [wear.evolution] of the wear study to be repeated?"
+        )
     low, high = (end(own, default=0.0) / (2.0 * math.pi) for end in (min, max))
     if stuck / math.pi < low < 2.0 * stuck and 0.5 * stuck < high:
         found.append(f"frequencies are all far above the first resonance, {stuck:.5g} Hz: are they in rad/s?")

@@ -84,7 +84,7 @@ class Lognormal(Distribution):
     WIDTHS = (("factor",),)
 
     median: Positive | None = None
-    factor: Annotated[float, Field(ge=1)] = Field(description="1 or more")
+    factor: Annotated[float, Field(ge=1)] = Field(description="ratio of the 84 % quantile to the median")
 
     def at(self, own: Array, score: Array) -> Array:  # noqa: D102
         return (own if self.median is None else self.median) * self.factor**score

@@ -183,10 +183,14 @@ class StudyRun(TaskHandler):
         return found
 
     def _factor(self, group: tuple[Hashable, ...]) -> float:
-        """Measured over estimated times of a group. In full from half of its work on: cheap results come first."""
+        """Measured over estimated times of a group. In full from half of its work on: cheap results come first.
+
+        Until then as much longer as all tasks have taken: where sweeps are hard, or the machine busy, so are histories.
+        """
         done = self.costs.sums.get(group[-1], (0.0, 0.0, 0))[1]
         known = min(1.0, 2.0 * done / max(done + self._left[group], 1e-9))
-        return 1.0 + known * (self.costs.correction((group,)) - 1.0)
+        of_all = max(1.0, self.costs.correction((group[:1],)))
+        return of_all + known * (self.costs.correction((group,)) - of_all)
 
     def _start(self, sweep: Task, result: StartResult) -> Sequence[Task]:
         """The tasks that begin from a start state, whose cost is known better now."""

@@ -6,14 +6,14 @@ By hand: `rich` takes five control characters out of a text, and leaves those th
 import argparse
 import json
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import date, time
 from pathlib import Path
 from typing import NoReturn
 
 _LONGEST_VALUE, _LONGEST_VERBATIM, _LONGEST_REMEDY = 80, 240, 600
-_MOST_LINES = 20
+_MOST_LINES, _MOST_LISTED = 20, 12
 _BARE_KEY = re.compile(r"[A-Za-z0-9_-]+")
 
 
@@ -119,6 +119,11 @@ def show_text(text: str) -> str:
         else letter.encode("unicode_escape", "backslashreplace").decode()
         for letter in text
     )
+
+
+def listing(values: Sequence[object]) -> str:
+    """The first of some values, and that there are more."""
+    return ", ".join(map(str, values[:_MOST_LISTED])) + ", ..." * (len(values) > _MOST_LISTED)
 
 
 def _cut(text: str, longest: int) -> str:

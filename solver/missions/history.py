@@ -21,7 +21,7 @@ from solver.packing import Packed, packable
 from solver.results.history import StartState, describe_cut_off, describe_uncertain, last_error, verdict
 from solver.settings import SHARE_OF_CAUSE, Passage
 from solver.wear.errors import Compared, HistoryError, compare, reach_target
-from solver.wear.slow_time import RTOL_RATIO, Course, Guide, Integrator, Node, Solution
+from solver.wear.slow_time import RTOL_RATIO, Course, Guide, Integrator, Node, Report, Solution
 
 
 @packable
@@ -181,7 +181,7 @@ def integrate_missions(
     mission: MissionRequest,
     keep: Callable[[Packed], None] | None = None,
     resume: Packed | None = None,
-    report: Callable[[str], None] = lambda _: None,
+    report: Report = lambda *_: None,
 ) -> MissionHistory:
     """Mission history of one point of a study, as far as computed, with its outcome.
 

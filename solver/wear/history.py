@@ -19,7 +19,7 @@ from solver.settings import SolverSettings, ToTheEnd
 from solver.structure.joint import Case, build_case
 from solver.wear.errors import compare, reach_target
 from solver.wear.problem import WearProblem, reference_of
-from solver.wear.slow_time import Course, Integrator, Node, Solution
+from solver.wear.slow_time import Course, Integrator, Node, Report, Solution
 from solver.wear.wearing_joint import Record, WearRequest
 
 LAG = 0.01
@@ -36,15 +36,15 @@ def integrate_together(
     requests: Sequence[WearRequest],
     keep: Callable[[Packed], None] | None = None,
     resume: Packed | None = None,
-    report: Callable[[str], None] = lambda _: None,
+    report: Report = lambda *_: None,
 ) -> Iterator[WearHistory]:
     """Wear histories from one start state, as far as computed; a history that fails raises no error.
 
     Each is that which it would be alone. All those with given steps are compared with one adaptive history.
 
     requests: they differ in nothing else but their steps, and their counts up to one last count.
-    keep: called from time to time with the progress; report: after each step, with words. resume: such progress of
-        some of these histories, which go on from there; the results are equal to the last bit, except `run_time`.
+    keep: called from time to time with the progress; report: after each step. resume: such progress of some
+        of these histories, which go on from there; the results are equal to the last bit, except `run_time`.
     """
     integrator, case = Integrator(settings.time_limit, keep, resume, report), None
     if start.state is not None:

@@ -69,13 +69,13 @@ class WearProblem(WearingJoint):
 
     # 1 s of 48 pairs, 17 s of 336; the cost of one more factorisation is negligible
     iterations_per_save = 100
-    unit = "cycle"
 
     def __init__(
         self, case: Case, start: StartState, request: WearRequest, guide: Guide | None = None, stable_end: bool = False
     ) -> None:
         super().__init__(case, start, request)
         self.guide, self.stable_end = guide, stable_end
+        self.unit = "cycle" if guide is None else "reference solution, cycle"
         self.name = f"{request.steps!r} {request.end!r} {request.until!r} {guide is None}"
         counts = np.zeros(0) if isinstance(request.cycles, ToTheEnd) else request.cycles
         self.course = Course(self.area, counts, request.until)

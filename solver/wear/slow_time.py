@@ -36,6 +36,11 @@ CERTIFIED = tuple(each.name for each in fields(Certificate) if each.name != "per
 """Values of a certificate; within a step, the larger value of both ends holds."""
 
 
+Report = Callable[[str, int, float], object]
+"""Takes after each step where a computation is: in words; how many solutions are complete; how far this one is to
+its last count or its target, 0 to 1, or 0 where that is not known."""
+
+
 @packable
 @dataclass(frozen=True)
 class Node:
@@ -98,6 +103,14 @@ class Course:
     def reached(self) -> float:
         """Count at which the target was reached, NaN until then."""
         return math.nan if self.target is None else self.reach(self.target)[0]
+
+    @property
+    def share(self) -> float:
+        """How far the last node is on the way to the last count or to the target; 0 where that is not known."""
+        shares = [float(self.counts[-1] / self.outputs[-1])] if self.outputs.size and self.outputs[-1] > 0.0 else []
+        if self.target is not None:
+            shares.append(float(self._values_of(self.target, self.counts[-1:])[0]) / self.target.value)
+        return min(1.0, max(shares, default=0.0))
 
     def after(self, node: Node) -> Course:
         """The course with another step."""
@@ -299,8 +312,8 @@ class Solution:
 class Integrator:
     """Integrates histories that belong together, each once.
 
-    time_limit: CPU seconds of each. keep: called from time to time with the packed progress; report: after each step,
-    with words. resume: such progress.
+    time_limit: CPU seconds of each. keep: called from time to time with the packed progress; report: after each step.
+    resume: such progress.
     """
 
     def __init__(
@@ -308,7 +321,7 @@ class Integrator:
         time_limit: float,
         keep: Callable[[Packed], None] | None = None,
         resume: Packed | None = None,
-        report: Callable[[str], None] = lambda _: None,
+        report: Report = lambda *_: None,
     ) -> None:
         self._time_limit, self._keep, self._report = time_limit, keep, report
         self._known: dict[str, Solution] = {} if resume is None else unpack(resume)
@@ -316,6 +329,7 @@ class Integrator:
     def integrate(self, problem: SlowProblem, spent: float = 0.0) -> Solution:
         """Integrate from the first or the saved state to the end. spent: CPU seconds of the time limit so far."""
         name, budget = problem.name, problem.run.budget
+        n_complete = sum(each.ended for each in self._known.values())
         known = self._known.get(name) or Solution(None, problem.course, None, ended=False)
         if known.ended:
             return known
@@ -328,7 +342,7 @@ class Integrator:
                 self._known[name] = Solution(state, course, after, True, budget.iterations, computing_time() - began)
                 return self._known[name]
             state, course = after
-            self._report(f"{problem.unit} {in_digits(course.counts[-1], 3)}")
+            self._report(f"{problem.unit} {in_digits(course.counts[-1], 3)}", n_complete, course.share)
             if budget.iterations >= saved_at + problem.iterations_per_save:
                 # done in every history, so that an interrupted one gives equal numbers
                 problem.run = problem.run.fresh()

@@ -80,7 +80,7 @@ def coordinates(study: Study, of_scenes: Sequence[SceneFacts], scenes: scene_set
         yield SmallArray(name, (dims[name],), labels, _coordinate_entry(study, name))
     yield from _of_pairs(of_scenes, scenes)
     if facts.edge is not None:
-        yield _of_scene("contact_edge", (), facts.edge.astype(np.int8))
+        yield _of_scene("contact_edge", (), facts.edge)
 
 
 def _of_pairs(facts: Sequence[SceneFacts], scenes: scene_set.SceneSet) -> Iterator[SmallArray]:

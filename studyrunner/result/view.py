@@ -19,7 +19,7 @@ from studyrunner.measured import MeasuredSection, Profile
 from studyrunner.result.opening import ENDED, as_history, kind_of, open_known, study_tables
 from studyrunner.statistics.study_statistics import statistics_of_file
 from studyrunner.units import show_cycles, show_value
-from studyrunner.user_error import UserError
+from studyrunner.user_error import UserError, listing
 
 NO_VOLUME = 1e-24
 """Volume, m3, below which wear is round-off: a thousand atoms."""
@@ -332,6 +332,5 @@ def _find_value(dataset: xr.Dataset, name: str, text: str) -> float | str:
             with suppress(TypeError, ValueError):
                 if value == text or math.isclose(value, float(text), rel_tol=1e-9):
                     return value  # type: ignore[no-any-return]
-        remedy = f"give one of the values of {name}: {', '.join(map(str, values[:12]))}"
-        remedy += ", ..." if len(values) > 12 else ""
+        remedy = f"give one of the values of {name}: {listing(values)}"
     raise UserError("command line", "--point", f"{name}={text}", remedy)

@@ -45,7 +45,7 @@ class SceneFacts:
     digest: str
     largest_harmonics: int | None = None
     stuck_frequency: float = math.nan
-    edge: NDArray[np.bool_] | None = None
+    edge: NDArray[np.int8] | None = None
 
     @cached_property
     def pairs(self) -> Hashable:
@@ -221,22 +221,24 @@ _WIDEST_GAP = 0.75 * np.pi
 """Angle between one neighbour and the next, from which on a pair is at the edge. Measured inside: pi / 2 on meshes of
 rows and columns with side ratios of 0.05 to 20, at most 2.13 on random points that keep a distance; rows 20 times as
 dense as their shift, or such cells moved at random by a tenth, are taken for edge. At a straight edge it is pi."""
+_NOT_KNOWN = 2
 _LONGEST = 2.5
 """Over the median distance to its neighbours: what is farther is across a hole or a notch."""
 
 
-def edge_pairs(contact: ContactInterface) -> NDArray[np.bool_]:
-    """Pairs (n_contact,) at the edge of their surface: those that the scene names, else by their positions.
+def edge_pairs(contact: ContactInterface) -> NDArray[np.int8]:
+    """Whether pairs (n_contact,) are at the edge of their surface, 1 or 0: those that the scene names, else by their
+    positions.
 
-    None of a surface that has nothing but edge, whose positions are not known, or which is not flat.
+    2, not known, of a surface that has nothing but edge, whose positions are not known, or which is not flat.
     """
     if contact.edge is not None:
-        return np.array(contact.edge)
-    found, labels = np.zeros(contact.n_contact, np.bool_), np.array(contact.surface)
+        return np.array(contact.edge, np.int8)
+    found, labels = np.zeros(contact.n_contact, np.int8), np.array(contact.surface)
     for surface in np.unique(labels):
         own = np.flatnonzero(labels == surface)
         edge = _edge(np.asarray(contact.position)[own])
-        found[own] = False if edge is None or edge.all() else edge
+        found[own] = _NOT_KNOWN if edge is None or edge.all() else edge
     return found
 
 

@@ -168,11 +168,12 @@ def saltelli_indices(inputs: Array, values: SampleValues, confidence: float) -> 
     with the others.
 
     inputs (n, d), values (..., n): 2 + d rows of each base sample, as `unit_design` has them. NaN as in
-    `rank_correlations`, with base samples. Intervals by bootstrap of the base samples.
+    `rank_correlations`, with base samples, and where these are no power of 2, as of a run that goes on. Intervals by
+    bootstrap of the base samples.
     """
     d = inputs.shape[1]
     n_base = len(inputs) // (2 + d)
-    if n_base < FEWEST:
+    if n_base < FEWEST or n_base.bit_count() > 1:
         return _unknown(values, 2 * d)
     rng = np.random.default_rng(_SEED)
     blocks = np.arange(len(inputs)).reshape(n_base, -1)

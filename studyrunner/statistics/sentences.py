@@ -9,6 +9,7 @@ from studyrunner.scatter import ScatterSection
 from studyrunner.statistics import samples
 from studyrunner.statistics.samples import FEWEST
 from studyrunner.statistics.study_statistics import CONFIDENCE, LIFE, QUANTILES, QUANTITIES
+from studyrunner.system.progress import count
 from studyrunner.units import show_number, show_percent
 
 _MM3 = 1e9
@@ -20,10 +21,10 @@ def describe_volumes(point: xr.Dataset) -> str:
     the lives where points end at a target.
     """
     probabilities, n_without = point["quantile"].values, int(point["n_without_value"])
-    share = 100.0 * (probabilities[-1] - probabilities[0])
+    of = f"{100.0 * (probabilities[-1] - probabilities[0]):.4g} % of {count_samples(point)}"
     if f"{LIFE}_quantile" in point:
-        return f"{share:.4g} % of {int(point['n_samples'])} samples last {_describe_spread(point, LIFE)}"
-    text = f"{share:.4g} % of {int(point['n_samples'])} samples wear {_describe_spread(point, 'worn_volume')}"
+        return f"{of} last {_describe_spread(point, LIFE)}"
+    text = f"{of} wear {_describe_spread(point, 'worn_volume')}"
     text += f"; {n_without} have no volume that can be trusted" if n_without else ""
     text += f"; deepest pair {_describe_spread(point, 'wear_depth')}" if "wear_depth_quantile" in point else ""
     (n_lower, n_upper), (lower, upper) = point["group_size"].values.tolist(), point["group_gap"].values * _MM3
@@ -32,6 +33,12 @@ def describe_volumes(point: xr.Dataset) -> str:
         contact = int(point["deciding_contact"])
         text += "" if contact < 0 else f", which differ in the wear depth of contact pair {contact}"
     return text
+
+
+def count_samples(point: xr.Dataset) -> str:
+    """How many samples there are, and that others are not computed yet."""
+    n_samples, n_left = int(point["n_samples"]), int(point["n_not_computed"])
+    return f"{n_samples} computed samples ({n_left} not computed)" if n_left else count(n_samples, "sample")
 
 
 def _describe_spread(point: xr.Dataset, name: str) -> str:
@@ -56,11 +63,14 @@ def describe_limit(point: xr.Dataset, name: str) -> str:
     ends, interval = (100.0 * point[f"{name}_within_limit{each}"].values for each in ("", "_interval"))
     side, words = ("at least", "life") if quantity.at_least else ("at most", name.replace("_", " "))
     limit = show_number(point[f"{name}_limit"].item() * quantity.factor, 4)
-    text = f"{words} {side} {limit} {quantity.shown}: {_range(*ends)} %"
-    text += f" probable ({100.0 * point.attrs['confidence']:g} % interval {_range(*interval)} %),"
-    text += f" {round(n_samples * ends[0] / 100.0)} of {n_samples} samples"
     n_unknown = int(point[f"{name}_not_placed"])
-    return text + (f", {n_unknown} not known" if n_unknown else "")
+    found = f"{round(n_samples * ends[0] / 100.0)} of {count_samples(point)}"
+    within = f"{100.0 * point.attrs['confidence']:g} % interval {_range(*interval)} %"
+    # a range of estimates beside the interval, which contains it, would be one too many
+    found = (
+        f"{found}, {n_unknown} not known, {within}" if n_unknown else f"{ends[0]:.3g} % probable ({within}), {found}"
+    )
+    return f"{words} {side} {limit} {quantity.shown}: {found}"
 
 
 def what_samples_tell(section: ScatterSection) -> str:

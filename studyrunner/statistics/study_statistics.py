@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from studyrunner.coordinates import SAMPLE
 from studyrunner.scatter import ScatterSection
@@ -90,11 +90,12 @@ def worn_volume_statistics(
     which count as beyond in the lowest and as within in the highest probability. The same of wear_depth (m), of the
     deepest pair, where the file has it; with a limit of response_amplitude (m), the largest of all responses up to the
     count; where points end at a target of cycles_to_target, whose limit is the least, and which inputs then decide.
-    n_samples, n_without_value; of the last count worn_volume_density (1/m3) over worn_volume_grid (m3), group_size (2),
-    group_gap (m3, two ends; NaN for one group), deciding_contact (-1: none).
+    Samples that a run has not come to, at any of the other axes, are left out, of a Saltelli design with their base
+    sample: n_not_computed. n_samples, n_without_value; of the last count worn_volume_density (1/m3) over
+    worn_volume_grid (m3), group_size (2), group_gap (m3, two ends; NaN for one group), deciding_contact (-1: none).
 
-    Raises ValueError where the result has no samples or no worn volume, a probability is not between 0 and 1, or a
-    limit is not above 0 or of what the file does not have.
+    Raises ValueError where the result has no samples, or none is computed, or no worn volume, a probability is not
+    between 0 and 1, or a limit is not above 0 or of what the file does not have.
     """
     for name in ("worn_volume", "outcome"):
         if name not in dataset or SAMPLE not in dataset[name].dims:
@@ -110,8 +111,11 @@ def worn_volume_statistics(
     if "cycle_count" in dataset:
         # each point has counts of its own: they share the last one only
         dataset = dataset.isel({CYCLE: [-1]})
-    section, rows = _scatter_of(dataset), np.arange(dataset.sizes[SAMPLE])
+    (section, there), n_rows = _come_to(dataset), dataset.sizes[SAMPLE]
+    if not there.size:
+        raise ValueError("No sample of the result is computed yet.")
     is_saltelli = section is not None and section.method == "saltelli"
+    dataset, rows = dataset.isel({SAMPLE: there}), np.arange(there.size)
     if section is not None and is_saltelli:
         # A and B are independent samples
         rows = rows[rows % section.rows_a_sample < 2]
@@ -125,8 +129,10 @@ def worn_volume_statistics(
         raise ValueError(f"Give limits above 0 of what the file has, not {wrong[0]} = {given[wrong[0]]}.")
     asked = _Asked(quantiles, confidence, {"worn_volume": exceed, "wear_depth": depth}, given)
     about_missing = _about("1", "samples without a value to be trusted")
+    n_left, about_left = n_rows * len(rows) // there.size - len(rows), _about("1", "samples that are not computed yet")
     found: _Arrays = {
         "n_samples": ((), np.int32(len(rows)), _about("1", "samples")),
+        "n_not_computed": ((), np.int32(n_left), about_left),
         "n_without_value": (names, (~values.is_known).sum(axis=-1), about_missing),
     }
     coords: dict[str, Any] = {"bound": ["lowest", "highest"]}
@@ -154,7 +160,7 @@ def statistics_of_file(dataset: xr.Dataset, blocks: xr.Dataset | None = None) ->
 
     blocks: variables of blocks of missions, over cycles as those of the dataset.
     """
-    if dataset.sizes.get(SAMPLE, 0) < 2 or "worn_volume" not in dataset:
+    if dataset.sizes.get(SAMPLE, 0) < 2 or "worn_volume" not in dataset or _come_to(dataset)[1].size < 2:
         return None
     dataset = dataset if blocks is None else _with_responses(dataset, blocks)
     counts = dataset.sizes[CYCLE]
@@ -182,6 +188,24 @@ def _scatter_of(dataset: xr.Dataset) -> ScatterSection | None:
         return None
     has_all = all(f"{DRAWN}{name}" in dataset.coords for name in section.inputs)
     return section if has_all and dataset.sizes[SAMPLE] % section.rows_a_sample == 0 else None
+
+
+def _come_to(dataset: xr.Dataset) -> tuple[ScatterSection | None, NDArray[np.intp]]:
+    """[scatter], as `_scatter_of`, and numbers of the samples that the run has come to at all points.
+
+    Of a Saltelli design whole base samples.
+    """
+    left, section = _ended(dataset, "not_computed"), _scatter_of(dataset)
+    left = left.any([name for name in left.dims if name != SAMPLE])
+    base = 1 if section is None else section.rows_a_sample
+    return section, np.flatnonzero(~left.values.reshape(-1, base).any(axis=1).repeat(base))
+
+
+def _ended(dataset: xr.Dataset, word: str) -> xr.DataArray:
+    """Points with this outcome."""
+    outcome: xr.DataArray = dataset["outcome"]
+    words = dict(zip(outcome.attrs["flag_meanings"].split(), np.atleast_1d(outcome.attrs["flag_values"]), strict=False))
+    return outcome.isin(words.get(word, -1))
 
 
 def _in_cycles(dataset: xr.Dataset) -> xr.Dataset:
@@ -213,10 +237,9 @@ def _read_samples(dataset: xr.Dataset, name: str) -> tuple[SampleValues, tuple[s
     if "response" in values.dims:
         values = values.isel(response=in_metres(values["response"].values)).max("response")
         errors = errors.max("response") if "response" in errors.dims else errors
-    values, outcome = values.transpose(..., SAMPLE), dataset["outcome"]
-    words = dict(zip(outcome.attrs["flag_meanings"].split(), np.atleast_1d(outcome.attrs["flag_values"]), strict=False))
+    values = values.transpose(..., SAMPLE)
     value, missing = values.values, values.isnull().values
-    sensitive = (outcome == words.get("sensitive", -1)).broadcast_like(values).transpose(*values.dims).values
+    sensitive = _ended(dataset, "sensitive").broadcast_like(values).transpose(*values.dims).values
     low, high = np.where(missing, 0.0, value), np.where(missing, np.inf, value)
     error = errors.fillna(np.inf).broadcast_like(values).transpose(*values.dims).values.copy()
     # nothing worn is known to be nothing

@@ -46,10 +46,13 @@ def _frequency(study: Study) -> Iterator[Wrong]:
     if word is None and study.loading is not None:
         remedy = 'leave it out: it is the range of axes.frequency = "peak"'
         yield Wrong("loading", study.loading.model_dump(), remedy)
-    is_fixed = not study.kind.follows or "ramp" in axes.sweep or "final" in axes.scheme
-    if word is not None and (is_fixed or len(frequency) > 1):
-        remedy = f'give Hz: "{word}" stands alone, and goes with no mission, no sweep "ramp" and no scheme "final"'
-        yield Wrong("axes.frequency", frequency, remedy)
+    if word is None:
+        return
+    if not study.kind.follows or len(frequency) > 1:
+        yield Wrong("axes.frequency", frequency, f'give Hz: "{word}" stands alone, and goes with no mission')
+    for key, other, instead in (("sweep", "ramp", '"up" or "down"'), ("scheme", "final", '"adaptive" or "implicit"')):
+        if other in getattr(axes, key):
+            yield Wrong(f"axes.{key}", other, f'give {instead} with axes.frequency = "{word}", or a frequency in Hz')
 
 
 def _amplitude(study: Study) -> Iterator[Wrong]:

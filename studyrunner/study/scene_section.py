@@ -15,7 +15,7 @@ from studies.scene_source import SceneSource, source_of
 from studyrunner.study.mistakes import check_tables, raise_wrong, scene_errors
 from studyrunner.study.text import Archived, check_result_file, result_errors
 from studyrunner.system.progress import count as counted
-from studyrunner.user_error import UserError, Verbatim
+from studyrunner.user_error import UserError, Verbatim, listing
 from studyrunner.values import Axis, NotNegative, Section, Wrong, listed
 
 if TYPE_CHECKING:
@@ -214,7 +214,7 @@ def _worn_in(dataset: "xr.Dataset", name: str, point: Mapping[str, object], cycl
             if value == wanted or (is_number and math.isclose(value, wanted, rel_tol=1e-12)):
                 return number
         near = sorted(filter(math.isfinite, values), key=lambda value: abs(value - wanted)) if is_number else values
-        remedy = f"give a value of the result: {', '.join(map(str, near[:10]))}"
+        remedy = f"give a value of the result: {listing(near)}"
         raise UserError(source, f"scene.worn.{name}", wanted, remedy)
 
     places = {name: place(name, point.get(name), dataset[name].values.tolist()) for name in axes}

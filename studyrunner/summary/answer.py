@@ -125,7 +125,7 @@ def _failures(result: Result) -> Iterator[Finding]:
     for number, n_points in zip(numbers.tolist(), counts.tolist(), strict=True):
         if number == Outcome.CONVERGED:
             continue
-        word, _, happened = describe_outcome(number)
+        word, sentence, happened = describe_outcome(number)
         place = tuple(np.argwhere(result.dataset["outcome"].values == number)[0].tolist())
         # the volumes in the message of a point whose error is known are no results
         is_silent = not result.has("message") or (number == Outcome.SENSITIVE and np.isfinite(result.errors[place]))
@@ -133,12 +133,14 @@ def _failures(result: Result) -> Iterator[Finding]:
         reason = f"{reason[:_LONGEST].rsplit(' ', 1)[0]} ..." if len(reason) > _LONGEST else reason
         advice = ". ".join(filter(None, (ADVICE.get(number), OF_GIVEN_NUMBERS.get(number) if given else "")))
         first, happened = reason[:1].upper() + reason[1:], _IN_SHORT.get(number, happened) if reason else happened
-        if result.varying:
+        is_complete = number in COMPLETE
+        label = "uncertain" if is_complete else "to do" if number == Outcome.NOT_COMPUTED else "failed"
+        if label == "to do":
+            happened = sentence.removesuffix(".")
+        elif result.varying:
             first = f"First: {': '.join(filter(None, (where_is(result, result.point_at(place)), reason)))}"
         of = f"{n_points} of {count(result.computed.size, 'point')}: " if result.computed.size > 1 else ""
-        is_complete = number in COMPLETE
         values = {"n_points": n_points, "is_complete": is_complete, "reason": reason, "advice": advice}
-        label = "uncertain" if is_complete else "failed"
         findings.append(Finding(word, label, of + ". ".join(filter(None, (happened, advice, first))), values))
     findings.sort(key=lambda each: (each.values["is_complete"], -each.values["n_points"]))
     yield from findings[:_MOST_FAILURES]

@@ -7,6 +7,7 @@ import pytest
 
 from solver import SolverSettings, WearTarget, allowable_amplitude
 from studies import build_scene
+from studyrunner.kinds.task import Part
 from studyrunner.report.figures.points import draw_trends
 from studyrunner.result.view import open_for_report
 from studyrunner.study.study_file import read_study
@@ -70,3 +71,19 @@ def test_each_search_is_a_task():
     plan = plan_of(study)
     assert (len(plan.results), plan.sweeps) == (4 + 4, ())
     assert SolverSettings().rtol == study.solver.rtol[0]
+
+
+def test_a_search_says_how_far_it_is_also_within_a_history():
+    task, told = (
+        plan_of(
+            read_study("sdof_slider", (*ASKED, "axes.frequency=150", "solver.harmonics=3", "solver.samples=32"))
+        ).results[0],
+        list[object](),
+    )
+    next(task.compute({0: build_scene("sdof_slider")}, told.append))
+    shares = [each.share for each in told if isinstance(each, Part)]
+    # an amplitude that gives no history is tried again without being counted
+    assert np.diff(shares).min() > -0.125
+    assert 0.0 <= shares[0] < 0.1
+    assert 0.8 < shares[-1] <= 1.0
+    assert len({*shares}) > 20

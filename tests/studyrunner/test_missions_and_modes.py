@@ -13,6 +13,7 @@ from studyrunner.cli import main
 from studyrunner.mpi import schedule
 from studyrunner.report.contents import draw_report
 from studyrunner.report.page import write_page
+from studyrunner.result.opening import open_result
 from studyrunner.result.view import open_for_report
 from studyrunner.scene.scene_set import find_scenes
 from studyrunner.study.study_file import read_study
@@ -286,7 +287,7 @@ def test_the_result_has_its_axes_and_the_values_of_the_solver(result):
 
 
 @pytest.mark.slow
-def test_a_mode_that_is_not_there_says_so(result):
+def test_a_mode_that_is_not_there_says_so_and_the_others_over_the_wear(result, path):
     said = result.message.isel(sweep=0, sample=0).sel(cycle=0)
     assert "followed down to the amplitude" in said.sel(mode=1, modal_amplitude=1e-6).item()
     assert "fewer linear modes" in said.sel(mode=3)[0].item()
@@ -294,6 +295,11 @@ def test_a_mode_that_is_not_there_says_so(result):
     modes = summary(result).values
     assert modes["mode 1"]["natural_frequency"] == [found.min(), found.max()]
     assert modes["mode 3"] == {"n_found": 0}
+    # in the order of the file, at the last amplitude where all was found
+    few = open_result(path).sel(mode=[1], modal_amplitude=[1e-3, 1e-4])
+    row = " ".join(str(few.fretwear.summary()).split())
+    expected = few.natural_frequency.isel(sweep=0, sample=1).sel(mode=1, modal_amplitude=1e-4).values
+    assert f"; after 10 000, 0 cycles {expected[0]:.6g}, {expected[1]:.6g} Hz and " in row
 
 
 @pytest.mark.slow

@@ -16,6 +16,7 @@ from studies.fe_models.from_files import model as from_files
 from studies.scene_file import read_description, read_mesh, write_scene
 from studies.scene_source import Bundled
 from studyrunner.cli import main
+from studyrunner.coordinates import COORDINATES
 from studyrunner.result import provenance
 from studyrunner.scene import scene as scene_room
 from studyrunner.scene.answers import write_study_scene
@@ -185,6 +186,12 @@ def test_a_scene_that_says_its_edge_is_believed():
     assert edge_pairs(contact).tolist() == [False] * 5 + [True]
     # along a line the ends are the edge
     assert edge_pairs(replace(contact, edge=None)).tolist() == [True] + [False] * 4 + [True]
+
+
+def test_of_a_surface_that_is_all_edge_it_is_not_known_what_is_inside():
+    x, y = np.meshgrid(np.arange(4.0), np.arange(2.0))
+    assert edge_pairs(contact_in_a_plane(x, y)).tolist() == [2] * 8
+    assert COORDINATES["contact_edge"].flags[2] == "not_known"
 
 
 # --- a scene file, and a result, are each enough ---

@@ -194,6 +194,17 @@ def test_the_seconds_left_fall_to_none_and_follow_what_was_measured():
     assert progress.look(()).n_done == progress.look(()).n_points == plan.n_points
 
 
+def test_before_a_history_has_ended_it_is_as_late_as_the_sweeps_were():
+    plan = tasks_of()
+    progress = StudyRun(MemoryIndex(plan), None, None, 1)
+    for sweep in plan.sweeps:
+        for start, seconds in zip(fake_sweep(sweep), sweep.costs, strict=True):
+            progress.costs.learn(sweep.cost_keys, seconds, 5.0 * seconds)
+            progress.take(sweep, start)
+    planned = sum(seconds for group, seconds in progress._left.items() if "sweep" not in group)
+    assert progress.look(()).seconds_left == pytest.approx(5.0 * planned, rel=0.1)
+
+
 def test_a_task_that_says_how_far_it_is_tells_the_time_left(monkeypatch):
     plan = tasks_of("axes.wear_coefficient=1e-12")
     progress, now = StudyRun(MemoryIndex(plan), None, None, 1), 100.0

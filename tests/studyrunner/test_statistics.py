@@ -23,7 +23,7 @@ from studyrunner.statistics.samples import (
 )
 from studyrunner.statistics.sentences import describe_limit, describe_ranking, describe_volumes, what_samples_tell
 from studyrunner.statistics.study_statistics import worn_volume_statistics
-from tests.studyrunner.results import SCATTER, sample_file
+from tests.studyrunner.results import SCATTER, fail, sample_file
 
 # Archard: V = k_w P s N, with lognormal k_w, P, s
 LOGARITHMS = np.log([1.5, 1.2, 1.1])
@@ -310,6 +310,26 @@ def test_samples_without_a_value_and_sensitive_ones_are_bands():
     # with more than 5 % of them there is no upper end
     part["worn_volume"][0, 8:20, 2], low[8:20] = np.nan, whole["worn_volume"][0, 8:20, 1]
     assert f"128 samples wear above {1e9 * np.sort(low)[6]:.3g} mm3" in said(worn_volume_statistics(part))
+
+
+@pytest.mark.parametrize(("method", "n_left"), [("sobol", 2), ("saltelli", 4)])
+def test_samples_that_a_run_has_not_come_to_are_left_out_and_counted(method, n_left):
+    """One at both points and one at the second; of a design of Saltelli with the other rows of their base."""
+    scatter = SCATTER.replace('"sobol"', f'"{method}"').replace("128", "16") + "limits = {worn_volume = 1e-6}\n"
+    dataset = sample_file(scatter)
+    n = dataset.sizes["sample"]
+    for flat in (3, n + 3, n + 9):
+        fail(dataset, flat, int(Outcome.NOT_COMPUTED))
+    found = worn_volume_statistics(dataset)
+    assert (found["n_not_computed"], found["worn_volume_not_placed"].max()) == (n_left, 0)
+    assert found["n_samples"] + n_left == (32 if method == "saltelli" else 16)
+    words = f"{int(found['n_samples'])} computed samples ({n_left} not computed)"
+    point = found.isel(frequency=0, cycle=-1)
+    assert words in said(found)
+    assert words in describe_limit(point, "worn_volume")
+    assert "above" not in said(found)
+    with pytest.raises(ValueError, match="No sample of the result is computed yet"):
+        worn_volume_statistics(dataset.assign(outcome=dataset["outcome"] * 0 + int(Outcome.NOT_COMPUTED)))
 
 
 def test_limits_are_those_of_the_study_or_given_and_samples_that_failed_are_not_known():

@@ -15,6 +15,7 @@ import xarray as xr
 from studies.scene_file import write_scene
 from studyrunner.cli import main
 from studyrunner.system import progress
+from studyrunner.user_error import listing
 from tests.mpi.launching import options
 from tests.studies.fe_models.decks import SECTOR
 from tests.studies.fe_models.matrix_files import write_matrix_input
@@ -76,6 +77,8 @@ WRONG = {
         outputs.loops=[0, 1] -> outputs.loops = 1
         slow_time.cycles=1e6 ; slow_time.outputs=200000 ; outputs.loops=[0]
         axes.frequency=peak -> loading.between
+        axes.frequency=resonance ; loading.between=[100, 200] ; axes.sweep=['down', 'ramp'] -> axes.sweep = "ramp"
+        axes.frequency=[1, 'peak'] ; loading.between=[1, 2] ; axes.sweep=ramp -> axes.frequency, axes.sweep = "ramp"
         axes.friction_coefficient=[0.3, -0.1] -> axes.friction_coefficient = -0.1
         axes.surfaces={{nosuch=[1, 2]}}
         axes.surfaces={{'<b>'=[1, 2]}} -> axes.surfaces.<b>
@@ -118,6 +121,7 @@ scatter.samples, scatter.mu.normal.sigma, axes.damping, scene.area, scene.mas
         axes.scheme=['adaptive', 'explicit'] -> axes.scheme = "explicit"
         slow_time.outputs=[0, 10]
         slow_time.cycles=5 ; axes.scheme=final
+        axes.frequency=peak ; loading.between=[100, 200] ; axes.scheme=final -> axes.scheme = "final"
         slow_time.until={wear_depth=1} ; axes.scheme=final
         outputs.variables=['default', 'exact'] -> outputs.variables = "exact"
     """,
@@ -125,7 +129,7 @@ scatter.samples, scatter.mu.normal.sigma, axes.damping, scene.area, scene.mas
         axes.frequency=['peak', 200.0]
         axes.frequency=200.0 -> loading
         loading.between=[230.0, 180.0]
-        axes.sweep=ramp -> axes.frequency
+        axes.sweep=ramp
         scatter={samples=3, frequency={normal={std=1.0}}} -> scatter.frequency
     """,
     small.MODES: """
@@ -346,3 +350,11 @@ def test_a_number_with_a_unit_is_said_in_si(given, number, capsys):
     key, _, value = given.partition("=")
     assert main(["sdof_slider", "--plan", "--set", f"{key.strip()}={value.strip()}"]) == 2
     assert f"give {number}, the number in SI" in capsys.readouterr().err
+
+
+def test_a_list_that_is_cut_says_that_there_are_more_and_no_remedy_is_said_twice(capsys):
+    assert listing(range(12)).endswith("10, 11")
+    assert listing(range(13)).endswith("10, 11, ...")
+    scatter = "scatter={samples = 8, friction_coefficient = {lognormal = {factor = 0.5}}}"
+    assert main(["sdof_slider", "--plan", "--set", scatter]) == 2
+    assert capsys.readouterr().err.count("1 or more") == 1

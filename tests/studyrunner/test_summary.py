@@ -154,6 +154,19 @@ def test_nothing_wore_says_why():
 # --- the resonance and the life ---
 
 
+def test_a_followed_resonance_that_turns_says_how_far_it_went():
+    """Above both ends by more than its error, below them by less."""
+    study = ("axes.frequency='resonance'", "loading.between=[180, 230]")
+    hertz = np.full(21, 200.0)
+    hertz[[5, 9, 20]] = 203.0, 199.9, 201.0
+    made = wearing(*study, excitation_frequency=lambda _: hertz, excitation_frequency_error=lambda _: np.full(21, 0.25))
+    row = dict(summary(made).rows)["resonance"]
+    assert "moved from 200 to 201 ± 0.25 Hz, highest 203 Hz after 5000 cycles; response" in row
+    assert "scene.worn" in row
+    assert summary(made).values["response"]["between"] == [(203.0, 5000.0)]
+    assert "highest" not in str(summary(made.drop_vars("excitation_frequency_error")))
+
+
 def test_the_peak_of_the_new_joint_lies_between_others():
     for peak, expected in ((1, 211.25), (0, math.nan), (2, math.nan)):
 
@@ -282,6 +295,14 @@ def test_points_that_failed_or_were_never_estimated_are_not_known():
     assert known["advice"] == ""
     failures = [each for each in found.findings if each.label in ("failed", "uncertain")]
     assert [each.name for each in failures] == ["march_failed", "inaccurate", "others"]
+
+
+def test_points_that_a_run_has_not_come_to_have_not_failed():
+    outcomes = {(1, 0): int(Outcome.NOT_COMPUTED), (2, 0): int(Outcome.NOT_COMPUTED), (2, 1): FAILED}
+    rows = summary(wearing(*GRID, outcome=lambda p: outcomes.get(at(p), 0))).rows
+    (left,) = (text for label, text in rows if label == "to do")
+    assert left == "2 of 9 points: The run ended before this point was computed. The same command continues"
+    assert [text[:11] for label, text in rows if label == "failed"] == ["1 of 9 poin"]
 
 
 def test_the_summary_is_short_whatever_came_out():

@@ -13,8 +13,9 @@ from solver.packing import pack
 from solver.results.history import StartState
 from solver.settings import Resolution
 from studyrunner.cli import main
-from studyrunner.kinds.wear.histories import build_result
+from studyrunner.kinds.wear.effort import share_done
 from studyrunner.kinds.wear.kind import ASKED, USUAL
+from studyrunner.kinds.wear.point import build_result
 from studyrunner.plan import doubts_of_study, effort_of
 from studyrunner.study.study_file import bundled_studies, read_study
 from tests.mpi.launching import options, results
@@ -250,6 +251,7 @@ def test_bundled_studies_are_plausible(name):
         ),
         ("dovetail", "slow_time.cycles=1e20", "slow_time.cycles 1e+20 is more than machines live", "meant"),
         ("mission", "mission.0.excitation_amplitude=1e9", "excitation_amplitude 1e+09 N", "in mN"),
+        ("dovetail", "scene.worn={depth=1e-6, energy=1e5}", "scene.worn has dissipated energies", "repeated"),
     ],
 )
 def test_other_units_are_asked_about_once(study, override, start, asked):
@@ -329,3 +331,23 @@ def test_a_scaled_history_is_inaccurate_by_its_own_counts(first, ended, expected
     # 4 cycles of the integrated history are 10 of the second, 2 of them 10 of the third
     for result, slower in zip(found[1:], (0.4, 0.2), strict=True):
         assert (f"from cycle {first / slower:.0f} on" in result.values["message"]) is bool(result.values["outcome"])
+
+
+def test_what_is_done_of_a_history_moves_with_its_cycles():
+    """With given steps first these, then the adaptive history and its reference solution."""
+    for scheme, n in (("adaptive", 2), ("implicit", 3)):
+        done = [share_done(scheme, 1000.0, 1e5, number, share) for number in range(n) for share in (1e-3, 0.5, 1.0)]
+        assert done == sorted(done)
+        assert 0.0 < done[0] < 0.05
+        assert done[-1] == pytest.approx(1.0)
+        assert share_done(scheme, 1000.0, 1e5, n, 0.5) == share_done(scheme, 1000.0, 1e5, 0, 0.0) == 0.0
+    assert share_done("adaptive", 1.0, 1e5, 0, 0.25) == pytest.approx(0.32)
+
+
+def test_a_contact_that_changes_is_planned_to_take_longer():
+    plain = tasks_of("axes.frequency=160")[1].results[0].cost
+    for energies, least in (("[0, 1e5]", 1.4), ("[0, 1e4, 1e5, 1e6]", 3.0)):
+        factors = [1.0] * (energies.count(",") + 1)
+        evolution = f"wear.evolution={{energy={energies}, wear_factor={factors}}}"
+        _, plan = tasks_of("axes.frequency=160", evolution)
+        assert least * plain < plan.results[0].cost < 2.0 * least * plain

@@ -10,7 +10,9 @@ from solver.model import ReducedModel
 from solver.packing import pack, unpack
 from solver.settings import Direction
 from studyrunner.kinds.task import Identity, Keep, Part, PointResult, Task, digest
-from studyrunner.kinds.wear.histories import History, build_result
+from studyrunner.kinds.wear.effort import share_done
+from studyrunner.kinds.wear.histories import History
+from studyrunner.kinds.wear.point import build_result
 
 if TYPE_CHECKING:
     from solver.allowable import Tried
@@ -58,23 +60,26 @@ class AllowableAmplitude(Task):
         assert until is not None
         direction = cast("Direction", excitation.direction)
         asked = history.asked(integrated, stopping_at(until))
-        frequencies = excitation.follow or np.array([history.frequency])
+        frequencies, end = excitation.follow or np.array([history.frequency]), history.cycles[-1]
+        known = () if self.resume is None else unpack(self.resume)
+        n_tried = len(known)
 
         def history_at(amplitude: float) -> "WearHistory":
-            def say(said: object) -> None:
+            def say(said: object, n_complete: int = 0, share: float = 0.0) -> None:
                 if isinstance(said, str):
-                    keep(f"{amplitude:.3g} N: {said}")
+                    done = n_tried + share_done(integrated.scheme, integrated.step, end, n_complete, share)
+                    words = f"{n_tried} of about {HISTORIES_OF_SEARCH} histories; {amplitude:.3g} N: {said}"
+                    keep(Part(done / max(HISTORIES_OF_SEARCH, n_tried + 1), words))
 
             sweeps = FrequencySweep(model, amplitude, direction, self.settings, say)
             _, start = next(sweeps.states(frequencies))
             return next(integrate_together(model, self.settings, start, [asked], report=say))
 
         def note(tried: "tuple[Tried, ...]") -> None:
+            nonlocal n_tried
+            n_tried = len(tried)
             keep(pack(tried))
-            share = len(tried) / max(HISTORIES_OF_SEARCH, len(tried) + 1)
-            keep(Part(share, f"{len(tried)} of about {HISTORIES_OF_SEARCH} histories"))
 
-        known = () if self.resume is None else unpack(self.resume)
         found = find_allowable(history_at, until, self.settings.rtol, known, note)
         result = build_result(history, integrated, found.history)
         own: dict[str, Any] = {"allowable_amplitude": found.amplitude, "allowable_amplitude_error": found.error}

@@ -8,9 +8,10 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
-from solver.outcome import SENSITIVE_ERROR, Outcome, absolute
+from solver.outcome import SENSITIVE_ERROR, Outcome
 from studyrunner.coordinates import SAMPLE
 from studyrunner.kinds.wear.meshes import compare_meshes
+from studyrunner.kinds.wear.response import describe_response
 from studyrunner.kinds.wear.sought import find_allowable
 from studyrunner.result.pairs import contact_pairs, has_depths, last_depth
 from studyrunner.result.view import NO_MOTION, NO_VOLUME, Point, Result
@@ -95,7 +96,7 @@ def _wear_and_response(result: Result, stuck: float) -> Iterator[Finding]:
         yield Finding("wear", "wear", "no worn volume is known within 50 %")
     yield from _of_limits(result)
     if result.has("response_amplitude") and result.computed[result.place(point)]:
-        yield _response(result, point, wears, resonance)
+        yield describe_response(result, point, wears, resonance)
 
 
 def _of_wear(result: Result, point: dict[str, int]) -> Iterator[Finding]:
@@ -196,7 +197,7 @@ def _deepest(result: Result, point: Point, at: int, where: str) -> Finding:
     text, share = text + where, math.nan
     if result.has("contact_surface", "contact_area", "contact_edge"):
         on_it = pairs.surface == surface
-        edge = on_it & (result.at("contact_edge", point).values != 0)
+        edge = on_it & (result.at("contact_edge", point).values == 1)
         if edge.any() and depths[on_it].any():
             share, of_area = (each[edge].sum() / each[on_it].sum() for each in (depths * pairs.area, pairs.area))
             if share > max(_SHARE, of_area):
@@ -247,58 +248,6 @@ def _where_slip_begins(result: Result) -> tuple[float, str]:
     where = result.describe(nearest, [name for name in result.varying if name not in _AFTER_THE_START])
     text = f"; slip begins at about {show(begins, 'N')}" + (f" at {where}" if where else "")
     return begins, f"{text}, extrapolated from {show(share * begins, 'N')}"
-
-
-def _response(result: Result, point: Point, wears: bool, resonance: str) -> Finding:
-    """Amplitudes of the response that is largest at a point, new and worn; NaN where known to a factor of two only."""
-    ends = [0, result.last_reached(point)]
-    amplitude = result.at("response_amplitude", point, ends).transpose("cycle", "response").values
-    of = int(np.argmax(amplitude[0]))
-    both = np.where(amplitude[:, of] > NO_MOTION, amplitude[:, of], 0.0)
-    has_errors = result.has("response_error")
-    wrong = result.at("response_error", point, ends).values if has_errors else np.full(2, np.nan)
-    both = np.where((wrong > SENSITIVE_ERROR) & (both > 0.0), np.nan, both)
-    errors, name = absolute(wrong, both), result.responses[of]
-    both_errors = zip(both.tolist(), errors.tolist(), strict=True)
-    new, worn = (with_error(value, error, "m") if has_errors else show(value, "m") for value, error in both_errors)
-    values: dict[str, Any] = {"response": name, "amplitude": both.tolist(), "error": errors.tolist()}
-    if result.followed and result.has("excitation_frequency"):
-        start, end = result.at("excitation_frequency", point, ends).values.tolist()
-        has_error = result.has("excitation_frequency_error")
-        error = float(result.at("excitation_frequency_error", point, ends[1])) if has_error else math.nan
-        shown = f"{end:.6g}" + (f" ± {error:.2g}" if math.isfinite(error) else " (error not known)" * has_error)
-        moved = f"moved from {start:.6g} to {shown} Hz" if wears else f"at {start:.6g} Hz"
-        text = f"{moved}, response of {name} {new}" + (f" to {worn}" if wears else "")
-        values |= {"frequency": [start, end], "frequency_error": error}
-        return Finding("response", result.followed, text, values)
-    if not both.any():
-        return Finding("response", "response", f"{name} does not move", values)
-    case = " at this point" if wears else f", most at {where_is(result, point)}"
-    text = f"{name}{case if result.computed.size > 1 else ''}: amplitude {new}"
-    if wears:
-        text += f" when new, {worn} when worn"
-    frequency, peak = _peak(result, point, of)
-    if math.isfinite(frequency):
-        text += f"; the new joint responds most at {frequency:.6g} Hz ({show(peak, 'm')})"
-    if wears and resonance:
-        follow = 'the moving resonance was not computed: axes.frequency = "resonance" follows it'
-        text += f"; {resonance}; {follow}" if "frequency" in result.axes else f"; {resonance}"
-    return Finding("response", "response", text, values | {"peak": frequency})
-
-
-def _peak(result: Result, point: Point, of: int) -> tuple[float, float]:
-    """Frequency, Hz, and amplitude, m, of the largest response of the unworn joint; NaN at the ends of the range."""
-    if result.dataset.sizes.get("frequency", 1) < 3:
-        return math.nan, math.nan
-    others = {name: index for name, index in point.items() if name != "frequency"}
-    row = result.at("response_amplitude", others, 0).isel(response=of)
-    there = result.has_values[tuple(others.get(name, slice(None)) for name in result.axes)]
-    order = np.argsort(row["frequency"].values)
-    values = np.where(there, row.values, np.nan)[order]
-    top = 0 if np.isnan(values).all() else int(np.nanargmax(values))
-    if not 0 < top < len(values) - 1 or np.isnan(values[top - 1 : top + 2]).any():
-        return math.nan, math.nan
-    return float(row["frequency"].values[order][top]), float(values[top])
 
 
 # --- life, meshes ---

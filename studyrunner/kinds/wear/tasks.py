@@ -21,6 +21,7 @@ from solver.settings import ToTheEnd
 from studyrunner.kinds.estimate import A_STATE, iterations_of_sweep, seconds_of
 from studyrunner.kinds.task import EQUAL_POINTS, TaskPlan, Work, n_unknowns_of
 from studyrunner.kinds.wear.allowable import COST_OF_A_HISTORY, HISTORIES_OF_SEARCH, AllowableAmplitude
+from studyrunner.kinds.wear.effort import iterations_of
 from studyrunner.kinds.wear.histories import Excitation, History, Integrated, Sweep
 from studyrunner.kinds.wear.kind import ALLOWED, OWN_STEPS
 from studyrunner.points.table import Points
@@ -30,13 +31,6 @@ from studyrunner.system.progress import count
 MOST_TOGETHER = 4
 """Histories of one task, which share the adaptive history that given steps are compared with. It takes about as long as
 one of them: with 4 a fifth more than with all, and another rank may take the rest."""
-
-# Newton iterations, see `estimate`
-_A_STEP = 2.5  # in slow time, explicit or implicit (2 to 4 where the joint slips, dovetail 2.2)
-_AN_ADAPTIVE_STEP = 10  # with refused steps and the reference solution (36 and 48 pairs near the resonance: 4 to 13)
-_ADAPTIVE_STEPS = 40  # of a history
-_STEPS_TO_THE_END = 100  # of a history until nothing wears any more, with growing steps (20 pairs: 50 to 110)
-
 
 _AT_ONCE = 4096  # groups of points: a million Python numbers take 30 MB
 
@@ -241,7 +235,7 @@ def _searches(study: Study, starts: _Starts, outputs: Mapping[str, Any]) -> Iter
             same = [place for place, each in zip(group.numbers.tolist(), values, strict=True) if each == value]
             largest = depth if value.scheme == "explicit" else None
             integrated = Integrated(value.scheme, value.step, largest, (value.wear_coefficient,), unworn=False)
-            iterations = _iterations([(value.scheme, value.step)], study.output_counts[-1])
+            iterations = iterations_of([(value.scheme, value.step)], study.output_counts[-1], _n_energies(study))
             cost = sweep.cost * sweep.first_share + seconds_of(sweep.n_unknowns, iterations)
             cost *= HISTORIES_OF_SEARCH * COST_OF_A_HISTORY
             own = {"cost": cost, "indices": (tuple(same),), "integrated": (integrated,)}
@@ -296,20 +290,12 @@ def _together(study: Study, shared: Sequence[_Shared]) -> Iterator[_Together]:
         for first in range(0, len(group), MOST_TOGETHER):
             integrated, points = zip(*group[first : first + MOST_TOGETHER], strict=True)
             cycles = 0.0 if integrated[0].unworn else math.inf if study.to_the_end else study.output_counts[-1]
-            iterations = _iterations([(each.scheme, each.step) for each in integrated], cycles)
+            iterations = iterations_of([(each.scheme, each.step) for each in integrated], cycles, _n_energies(study))
             yield _Together(integrated, tuple(itertools.chain.from_iterable(points)), iterations)
 
 
-def _iterations(steps: Sequence[tuple[str, float]], cycles: float) -> float:
-    """Newton iterations of histories over so many cycles where the joint wears. steps: scheme and step of each; those
-    with given steps are compared with the adaptive history.
-    """
-    if cycles == 0.0:
-        return _A_STEP
-    given = [step for scheme, step in steps if scheme not in ("adaptive", "final")]
-    n_steps = sum(max(1.0, cycles / step) if cycles < math.inf else _STEPS_TO_THE_END for step in given)
-    adaptive = _ADAPTIVE_STEPS if cycles < math.inf else _STEPS_TO_THE_END
-    return _AN_ADAPTIVE_STEP * adaptive + _A_STEP * n_steps
+def _n_energies(study: Study) -> int:
+    return len(study.wear.evolution.energy) if study.wear.evolution else 0
 
 
 WAYS = {

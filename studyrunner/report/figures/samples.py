@@ -11,7 +11,7 @@ from studyrunner.report import drawing as plot
 from studyrunner.report.drawing import COLOURS, Drawn, FloatArray, as_sentences
 from studyrunner.report.selection import choose, find_course, slow_time
 from studyrunner.result.view import NO_VOLUME, Result
-from studyrunner.statistics.sentences import describe_ranking, measure_of
+from studyrunner.statistics.sentences import count_samples, describe_ranking, measure_of
 from studyrunner.statistics.study_statistics import LIFE, QUANTITIES, RESPONSE
 from studyrunner.system.progress import count
 from studyrunner.units import Scale, scale_for, units_of
@@ -102,7 +102,7 @@ def draw_bands(result: Result, of: tuple[str, str]) -> Drawn:
 
 def _n_samples(statistics: xr.Dataset) -> str:
     confidence = 100.0 * float(statistics.attrs["confidence"])
-    return f"{count(int(statistics['n_samples']), 'sample')}, intervals of {confidence:g} % confidence"
+    return f"{count_samples(statistics)}, intervals of {confidence:g} % confidence"
 
 
 def _draw_band(panel: Axes, at: FloatArray, volume: FloatArray, wrong: FloatArray, scale: Scale) -> None:
