@@ -85,8 +85,11 @@ def ascending(values: tuple[float, ...]) -> tuple[float, ...]:
 def read_axis(value: object) -> tuple[Any, ...]:
     """The values of an axis, each once: one, a list of them or {start, stop, num}. Raises ValueError.
 
-    A range between whole numbers whose values are whole numbers gives whole numbers.
+    A range between whole numbers whose values are whole numbers gives whole numbers. A tuple, which no file and no list
+    of an override is, holds the values of a column of a design: any number of them, which differ.
     """
+    if isinstance(value, tuple) and value:
+        return value
     values = tuple(listed(value))
     if isinstance(value, dict):
         if value.keys() - {"spacing"} != {"start", "stop", "num"}:
@@ -94,8 +97,7 @@ def read_axis(value: object) -> tuple[Any, ...]:
         values = Range.model_validate(value).values
         if isinstance(value["start"], int) and isinstance(value["stop"], int):
             values = tuple(int(each) if each == int(each) else each for each in values)
-    # the columns of a design are tuples, which no file and no list of an override is
-    if not values or (len(values) > LONGEST_AXIS and not isinstance(value, tuple)):
+    if not values or len(values) > LONGEST_AXIS:
         raise ValueError(f"give at least one value, and at most {LONGEST_AXIS}")
     for each in values:
         if not isinstance(each, bool | int | float | str):

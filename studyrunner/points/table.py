@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from studyrunner.coordinates import POINT, SAMPLE
 from studyrunner.points.draw import samples_of
-from studyrunner.study.design import group_rows
+from studyrunner.study.design import CODE, Codes, as_they_come, group_rows
 from studyrunner.study.sections import SOLVER_AXES, AxesSection
 from studyrunner.study.study import Study
 
@@ -23,14 +23,14 @@ class Column:
     """
 
     along: tuple[str, ...]
-    codes: NDArray[np.intp]
+    codes: Codes
     values: Sequence[Any]
 
 
-def column(along: Sequence[str], codes: NDArray[np.intp], objects: Iterable[Hashable]) -> Column:
+def column(along: Sequence[str], codes: Codes, objects: Iterable[Hashable]) -> Column:
     """The column in which equal objects are one value. codes: places in `objects`, over all of `along`."""
     known: dict[Hashable, int] = {}
-    first = np.array([known.setdefault(each, len(known)) for each in objects], np.intp)
+    first = np.array([known.setdefault(each, len(known)) for each in objects], CODE)
     codes, kept = first[codes], list[str]()
     for place, name in reversed(list(enumerate(along))):
         if (codes == codes.take([0], axis=place)).all():
@@ -38,6 +38,43 @@ def column(along: Sequence[str], codes: NDArray[np.intp], objects: Iterable[Hash
         else:
             kept.insert(0, name)
     return Column(tuple(kept), codes, tuple(known))
+
+
+@dataclass(frozen=True, eq=False)
+class Combinations:
+    """Combinations of values of columns, each made when it is asked for: there may be as many as points.
+
+    values: of each column. places: of each column those of the combinations among its values (n,).
+    """
+
+    values: tuple[Sequence[Any], ...]
+    places: tuple[Codes, ...]
+
+    def __len__(self) -> int:
+        return len(self.places[0])
+
+    def __getitem__(self, number: int) -> tuple[Any, ...]:
+        return tuple([own[at[number]] for own, at in zip(self.values, self.places, strict=True)])
+
+    def __iter__(self) -> Iterator[tuple[Any, ...]]:
+        columns = zip(self.values, self.places, strict=True)
+        return zip(*([own[place] for place in at.tolist()] for own, at in columns), strict=True)
+
+    def taken(self, numbers: Codes) -> "Combinations":
+        """Some of them. A column with one value takes no memory."""
+        pairs = zip(self.values, self.places, strict=True)
+        alike = np.broadcast_to(CODE(0), len(numbers))
+        return Combinations(self.values, tuple(at[numbers] if len(own) > 1 else alike for own, at in pairs))
+
+    def codes(self, *which: int) -> tuple[Codes, Codes]:
+        """As `group_rows`, of the combinations by some of the columns."""
+        return group_rows((self.places[place], len(self.values[place])) for place in which)
+
+    def each(self, make: Callable[..., Any], *which: int) -> NDArray[Any]:
+        """What is made of the values of some of the columns, (n,): once of equal ones."""
+        first, rows = self.codes(*which)
+        made = [make(*(self.values[place][self.places[place][row]] for place in which)) for row in first.tolist()]
+        return np.array(made)[rows]
 
 
 @dataclass(frozen=True)
@@ -59,7 +96,7 @@ class Points:
         """Number of points."""
         return math.prod(self.dims.values())
 
-    def over(self, found: Column, dims: Iterable[str]) -> NDArray[np.intp]:
+    def over(self, found: Column, dims: Iterable[str]) -> Codes:
         """Codes of a column over dimensions, all those of the column among them, in any order."""
         names = tuple(dims)
         codes = found.codes.transpose([found.along.index(each) for each in names if each in found.along])
@@ -75,16 +112,15 @@ class Points:
         """The value of a column at the indices of a point."""
         return found.values[found.codes[tuple(point[each] for each in found.along)]]
 
-    def grouped(self, *columns: Column) -> tuple[tuple[str, ...], NDArray[np.intp], list[tuple[Any, ...]]]:
+    def grouped(self, *columns: Column) -> tuple[tuple[str, ...], Codes, Combinations]:
         """The dimensions of several columns, over them numbers of the combinations of values that there are, and these
         combinations.
         """
         names = tuple(each for each in self.dims if any(each in one.along for one in columns))
         codes = [self.over(one, names).ravel() for one in columns]
         first, numbers = group_rows((own, len(one.values)) for one, own in zip(columns, codes, strict=True))
-        places = (own[first].tolist() for own in codes)
-        combinations = zip(*([one.values[k] for k in at] for one, at in zip(columns, places, strict=True)), strict=True)
-        return names, numbers.reshape([self.dims[each] for each in names]), list(combinations)
+        of_all = Combinations(tuple(one.values for one in columns), tuple(codes))
+        return names, numbers.reshape([self.dims[each] for each in names]), of_all.taken(first)
 
     def combined(self, make: Callable[..., Hashable], *columns: Column) -> Column:
         """The column of what is made of the values of other columns."""
@@ -118,22 +154,23 @@ class Points:
         return sorted(self.dims, key=lambda name: name in self.own)
 
     @property
-    def numbers(self) -> NDArray[np.intp]:
+    def numbers(self) -> Codes:
         """Numbers (n,) of the points in the order of the result, as tasks walk through them: scene after scene."""
-        whole = np.arange(self.n).reshape(tuple(self.dims.values()))
+        whole = np.arange(self.n, dtype=CODE).reshape(tuple(self.dims.values()))
         return whole.transpose([list(self.dims).index(name) for name in self._walk]).ravel()
 
-    def walked(self, *columns: Column) -> tuple[NDArray[np.intp], list[tuple[Any, ...]]]:
+    def walked(self, *columns: Column) -> tuple[Codes, Combinations]:
         """For each point, in the order of `numbers`, the number (n,) of its combination of values of columns; and these
         combinations, in the order in which they come first.
         """
-        names, codes, combinations = self.grouped(*columns)
-        codes = self.over(Column(names, codes, ()), self._walk).ravel()
-        first = np.unique(codes, return_index=True)[1]
-        order = np.argsort(first)
-        rank = np.empty(len(order), np.intp)
-        rank[order] = np.arange(len(order))
-        return rank[codes], [combinations[place] for place in order.tolist()]
+        names, codes, found = self.grouped(*columns)
+        first, rows = group_rows([(self.over(Column(names, codes, ()), self._walk).ravel(), len(found))])
+        _, rows, order = as_they_come(first, rows)
+        return rows, found.taken(order)
+
+    def values_walked(self, found: Column) -> NDArray[Any]:
+        """The value (n,) of a column at each point, in the order of `numbers`."""
+        return np.array(found.values)[self.over(found, self._walk).ravel()]
 
     def groups(self, *columns: Column) -> Iterator[tuple[tuple[Any, ...], list[int]]]:
         """Combinations of values of columns, as they come first, each with the numbers of its points."""

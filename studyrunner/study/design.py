@@ -18,18 +18,45 @@ from studyrunner.user_error import UserError
 TASK = "task"
 """Column of the table of a plan: it and those behind it say more of the points than the axes before it."""
 
+Codes = NDArray[np.signedinteger[Any]]
+CODE = np.int32
+"""Type of numbers of points and of values: a study has at most a million points."""
+
 _WHOLE = 2**53  # from here on, numbers without a fraction may have lost theirs
+_DENSE = 4  # codes are counted, and not sorted, up to so many for each row
 _FIRST = 2  # row of a file with the first point, below the header
 
 
-def group_rows(codes: Iterable[tuple[NDArray[np.intp], int]]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+def group_rows(codes: Iterable[tuple[Codes, int]]) -> tuple[Codes, Codes]:
     """First rows of the different combinations in columns of codes, each with the number of codes, and for each row
     which of them it has.
     """
-    first, rows = np.zeros(1, np.intp), np.zeros(1, np.intp)
+    first, rows = np.zeros(1, CODE), np.zeros(1, CODE)
     for own, size in codes:
-        _, first, rows = np.unique(rows * size + own, return_index=True, return_inverse=True)
+        if len(first) == len(own):
+            # all rows differ already
+            break
+        keys, most = rows.astype(np.int64) * size + own, len(first) * size
+        if most > _DENSE * len(keys):
+            _, first, rows = np.unique(keys, return_index=True, return_inverse=True)
+            first, rows = first.astype(CODE), rows.astype(CODE)
+            continue
+        # without sorting; of equal keys the first is written last
+        first = np.full(most, -1, CODE)
+        first[keys[::-1]] = np.arange(len(keys), dtype=CODE)[::-1]
+        there = first >= 0
+        first, rows = first[there], np.cumsum(there, dtype=CODE)[keys] - 1
     return first, rows.reshape(-1)
+
+
+def as_they_come(first: Codes, rows: Codes) -> tuple[Codes, Codes, Codes]:
+    """Groups of rows, as of `group_rows`, in the order in which they come first: their first rows, for each row which
+    of them it has, and the numbers that the groups had.
+    """
+    order = np.argsort(first)
+    number = np.empty(len(order), CODE)
+    number[order] = np.arange(len(order))
+    return first[order], number[rows], order.astype(CODE)
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,7 +68,7 @@ class DesignColumn:
 
     key: str
     values: tuple[Any, ...]
-    codes: NDArray[np.intp]
+    codes: Codes
     unit: str | None = None
 
 
@@ -61,7 +88,7 @@ class Design:
         """Number of rows."""
         return len(next(iter(self.columns.values())).codes)
 
-    def groups(self, names: Iterable[str]) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+    def groups(self, names: Iterable[str]) -> tuple[Codes, Codes]:
         """As `group_rows`, of columns."""
         first, rows = group_rows((self.columns[name].codes, len(self.columns[name].values)) for name in names)
         return first, np.broadcast_to(rows, self.n)
@@ -119,6 +146,8 @@ def _from_file(path: Path, source: str) -> Design:
             header = file.readline()
             delimiter = next((each for each in ";\t" if each in header), ",")
             names, empty = next(csv.reader([header.lstrip("# ")], delimiter=delimiter), []), 0
+            if (numbers := _numbers_in(path, delimiter, len(names))) is not None:
+                return make_design(source, names, [*numbers.T], _FIRST)
             columns += ([] for _ in names)
             for number, row in enumerate(csv.reader(file, delimiter=delimiter), _FIRST):
                 # empty lines at the end are none
@@ -134,6 +163,19 @@ def _from_file(path: Path, source: str) -> Design:
     return make_design(source, names, columns, _FIRST)
 
 
+def _numbers_in(path: Path, delimiter: str, n_columns: int) -> NDArray[np.float64] | None:
+    """Rows (n, n_columns) of a file of numbers alone, a row a line below the header; None of any other."""
+    with path.open("rb") as file:
+        n_rows = sum(1 for _ in file) - 1
+    if n_rows < 1:
+        return None
+    try:
+        found = np.loadtxt(path, delimiter=delimiter, skiprows=1, comments=None, ndmin=2, encoding="utf-8-sig")
+    except ValueError:
+        return None
+    return found if found.shape == (n_rows, n_columns) else None
+
+
 def _parse(text: str) -> object:
     text = text.strip()
     try:
@@ -142,7 +184,9 @@ def _parse(text: str) -> object:
         return {"true": True, "false": False}.get(text.lower(), text)
 
 
-def make_design(source: str, headers: Sequence[object], values: Sequence[list[Any]], first: int = 0) -> Design:
+def make_design(
+    source: str, headers: Sequence[object], values: Sequence[list[Any] | NDArray[np.float64]], first: int = 0
+) -> Design:
     """The design with these columns. headers: keys of [axes], which may have a unit behind them, in [ ].
 
     Of the table of a plan, which has a column `TASK`, only columns before this one are read, and rows that are equal in
@@ -177,18 +221,30 @@ def make_design(source: str, headers: Sequence[object], values: Sequence[list[An
     return design
 
 
-def _column(design: Design, key: str, unit: str | None, given: Iterable[Any]) -> DesignColumn:
+def _column(design: Design, key: str, unit: str | None, given: list[Any] | NDArray[np.float64]) -> DesignColumn:
     """A column, in which numbers without a fraction are whole numbers if all are."""
-    values = [value.item() if isinstance(value, np.generic) else value for value in given]
-    for row, value in enumerate(values):
-        if value == "" or not isinstance(value, bool | int | float | str):
-            raise design.error(row, key, value or None, "missing: give a number or a name")
-        if isinstance(value, float) and not math.isfinite(value):
-            raise design.error(row, key, value, "give a finite number")
+    if isinstance(given, np.ndarray):
+        for row in np.flatnonzero(~np.isfinite(given)).tolist():
+            raise _not_finite(design, row, key, float(given[row]))
+        _, first, rows = np.unique(given, return_index=True, return_inverse=True)
+        first, codes, _ = as_they_come(first, rows)
+        values = known = given[first].tolist()
+    else:
+        values = [value.item() if isinstance(value, np.generic) else value for value in given]
+        for row, value in enumerate(values):
+            if value == "" or not isinstance(value, bool | int | float | str):
+                raise design.error(row, key, value or None, "missing: give a number or a name")
+            if isinstance(value, float) and not math.isfinite(value):
+                raise _not_finite(design, row, key, value)
+        places = {value: place for place, value in enumerate(dict.fromkeys(values))}
+        known, codes = list(places), np.array([places[value] for value in values], CODE)
     if all(type(value) is float and value.is_integer() and abs(value) < _WHOLE for value in values):
-        values = list(map(int, values))
-    known = {value: place for place, value in enumerate(dict.fromkeys(values))}
-    return DesignColumn(key, tuple(known), np.array([known[value] for value in values], np.intp), unit)
+        known = list(map(int, known))
+    return DesignColumn(key, tuple(known), codes, unit)
+
+
+def _not_finite(design: Design, row: int, key: str, value: float) -> UserError:
+    return design.error(row, key, value, "give a finite number")
 
 
 def read_archived_design(path: Path, source: str, keys: Any) -> Design:

@@ -81,6 +81,21 @@ def test_points_know_their_task():
                 assert values["step"] == integrated.step or integrated.scheme == "adaptive"
 
 
+@pytest.mark.parametrize("frequencies", [[150.0, 160.0], np.linspace(150.0, 160.0, 40)])
+@pytest.mark.parametrize("overrides", [{}, {"axes.step": [10, 100], "axes.scheme": ["implicit", "adaptive"]}])
+def test_a_plan_counts_the_tasks_that_a_design_has(frequencies, overrides):
+    """Also those of start states that are alike, which it does not make one by one."""
+    random = np.random.default_rng(0)
+    columns = {"frequency": frequencies, "excitation_amplitude": [9.0, 10.0], "wear_coefficient": [0.0, 1e-12, 1e-11]}
+    rows = dict.fromkeys(zip(*(random.choice(each, 99).tolist() for each in columns.values()), strict=True))
+    study = read_study("sdof_slider", overrides, ([*rows], [*columns]))
+    plan = plan_of(study)
+    counted, made = effort_of(study, plan.works), effort_of(study, (task.work for task in plan.sweeps + plan.results))
+    assert counted[:3] == made[:3]
+    assert counted.seconds == pytest.approx(made.seconds)
+    assert_every_point_once(study, plan)
+
+
 @pytest.mark.slow
 def test_a_plan_of_many_points_takes_little_memory():
     """Of a million points about 200 MB, where all tasks would take 900 MB."""
