@@ -24,7 +24,7 @@ tasks are tried one after the other, so that another task is seldom to blame."""
 class CompletionIndex:
     """Results and start states of a plan, in a file that may contain those of earlier runs and of other studies.
 
-    facts: of all scenes, see `merge_facts`. scenes: hash of the model of each. plan: its tasks have keys.
+    facts: of all scenes, see `merge_facts`. scenes: hash of the model of each. plan: its tasks have names.
     kind: data type of the record of a point, an element of an array of numpy with all values of its result.
     """
 
@@ -37,7 +37,7 @@ class CompletionIndex:
                 empty[name] = math.nan
         # numpy copies a record field by field, and bytes at once
         self._empty = empty.tobytes()
-        self.plan = plan.named(Identity(tuple(scenes), digest(repr(self.kind.descr))))
+        self.plan = plan.named(Identity(tuple(scenes), digest(repr(self.kind.descr))), store.keys(RESULTS))
 
     def _missing(self, task: Task) -> list[int]:
         """Places of a task whose result is not there."""
@@ -170,6 +170,8 @@ class CompletionIndex:
         """
         message = f"{MOST_CRASHES} runs in a row have crashed or were killed while they were at it"
         given_up = {key for key, number in self.store.crashes.items() if number >= MOST_CRASHES}
+        if not given_up:
+            return
         swept = [sweep for sweep in self.plan.sweeps if sweep.key in given_up]
         lost = {(sweep.number, place) for sweep in swept for place in self._missing(sweep)}
         for task in self.plan.results:

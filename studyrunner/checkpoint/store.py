@@ -13,7 +13,7 @@ import sqlite3
 import time
 import zlib
 from collections import defaultdict
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -92,7 +92,7 @@ class Store:
         self.notes: list[str] = []
         self._next_write, self._n_bytes = 0.0, 0  # bytes in the open transaction
         self._under_way: set[str] = set()
-        self._keys: dict[str, set[str]] = defaultdict(set)
+        self._keys: dict[str, dict[str, str]] = defaultdict(dict)
         with _storage_errors(path):
             try:
                 self._database = _open_locked(path)
@@ -105,7 +105,7 @@ class Store:
                 self._database = _open_locked(path)
             self._file = path.stat().st_ino
             for kind, key in self._database.execute("SELECT kind, key FROM entries"):
-                self._keys[kind].add(key)
+                self._keys[kind][key] = key
             self.crashes: dict[str, int] = dict(self._database.execute(_COUNTS, [_CRASHES]))
             remove_leftovers(path)
         self.ended_hard = _OPEN in self._keys[_FILE]
@@ -139,8 +139,8 @@ class Store:
         elif kind == RESULTS:
             raise StorageError(self.path, ValueError(f"{packed.n_bytes:.3g} bytes in one entry"), "use a smaller model")
 
-    def keys(self, kind: str) -> Collection[str]:
-        """Keys of all entries of a kind, on the disk or on their way."""
+    def keys(self, kind: str) -> Mapping[str, str]:
+        """Keys of all entries of a kind, on the disk or on their way, each by itself."""
         return self._keys[kind]
 
     def read(self, kind: str, key: str, take: Callable[[Packed], Any] = lambda packed: packed) -> Any:
@@ -159,12 +159,12 @@ class Store:
     def forget(self, kind: str, key: str) -> None:
         """Removes an entry with the next transaction."""
         if key in self._keys[kind]:
-            self._keys[kind].discard(key)
+            del self._keys[kind][key]
             self._execute("DELETE FROM entries WHERE kind=? AND key=?", kind, key)
 
     def _write(self, kind: str, key: str, blob: bytes) -> None:
         self._execute("INSERT OR REPLACE INTO entries VALUES (?, ?, ?)", kind, key, blob)
-        self._keys[kind].add(key)
+        self._keys[kind][key] = key
         self._n_bytes += len(blob)
         if self._n_bytes > _BYTES_A_TRANSACTION:
             self.flush()

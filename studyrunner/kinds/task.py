@@ -9,7 +9,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Hashable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any, ClassVar, NamedTuple
 
 from solver.model import ReducedModel
@@ -130,7 +130,7 @@ class Task(ABC):
         first result; the others take equal ones of the rest.
     n_unknowns: of its largest state; an estimate where the number of harmonics is automatic.
     skipped: places whose results are not needed, or are there from an earlier run. resume: progress of an earlier run.
-    names: of the results in the file of a run, by place (`hashes`). key: of the task there.
+    names: of the results in the file of a run, by place (`hashes`).
     scenes: numbers of the scenes whose models the task needs. models: of these, for a rank that does not have them.
     variables: names of the variables in a result. indices: for each place the points of the study that have its result;
         none for start states.
@@ -148,10 +148,14 @@ class Task(ABC):
     skipped: frozenset[int] = frozenset()
     resume: Packed | None = field(default=None, compare=False, repr=False)
     names: tuple[str, ...] = field(default=(), compare=False, repr=False)
-    key: str = field(default="", compare=False, repr=False)
     models: tuple[ReducedModel | MappedFile, ...] = field(default=(), compare=False, repr=False)
     variables: tuple[str, ...] = ()
     indices: tuple[tuple[int, ...], ...] = ()
+
+    @property
+    def key(self) -> str:
+        """Of the task in the file of a run."""
+        return _key_of(self.names)
 
     @property
     def order(self) -> tuple[int, ...]:
@@ -234,6 +238,12 @@ def digest(*values: object) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:32]
 
 
+@lru_cache(maxsize=4096)
+def _key_of(names: tuple[str, ...]) -> str:
+    # not kept by the tasks: there may be a million
+    return digest("task", names)
+
+
 @dataclass(frozen=True)
 class TaskPlan:
     """All tasks of a study.
@@ -259,12 +269,11 @@ class TaskPlan:
         """The tasks that give the results of points."""
         return tuple(self.make())
 
-    def named(self, identity: Identity) -> "TaskPlan":
-        """The plan with the names and keys of its tasks."""
+    def named(self, identity: Identity, known: Mapping[str, str] = {}) -> "TaskPlan":
+        """The plan with the names of its tasks. known: names that are in memory already, each by itself."""
 
         def with_names(task: Task) -> Task:
-            names = task.hashes(identity)
-            return replace(task, names=names, key=digest("task", names))
+            return replace(task, names=tuple([known.get(name, name) for name in task.hashes(identity)]))
 
         of_sweeps, of_results = self.make_sweeps, self.make
         return replace(

@@ -139,11 +139,11 @@ class MemoryIndex:
     store = SimpleNamespace(crashes=())
 
     def __init__(self, plan: TaskPlan) -> None:
-        # keys as in a file
+        # names as in a file
         self.plan = replace(
             plan,
-            make_sweeps=lambda: (replace(task, key=f"sweep {task.number}") for task in plan.make_sweeps()),
-            make=[replace(task, key=str(task.number)) for task in plan.results].__iter__,
+            make_sweeps=lambda: (replace(task, names=(f"sweep {task.number}",)) for task in plan.make_sweeps()),
+            make=[replace(task, names=(str(task.number),)) for task in plan.results].__iter__,
         )
 
     def sweeps_left(self) -> list[Task]:

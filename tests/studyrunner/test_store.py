@@ -178,7 +178,7 @@ def test_a_damaged_file_or_that_of_another_version_is_kept_aside_and_the_study_b
         assert path.with_name("out.nc.progress.old").read_bytes() == before
     with contextlib.closing(Store(path)) as opened:
         assert opened.notes == []
-        assert opened.keys(RESULTS) == {key(8)}
+        assert opened.keys(RESULTS).keys() == {key(8)}
 
 
 def test_a_damaged_entry_is_forgotten_and_nothing_else(path):
@@ -186,7 +186,7 @@ def test_a_damaged_entry_is_forgotten_and_nothing_else(path):
     change_tables(path, f"UPDATE entries SET blob=x'00' WHERE kind='{RESULTS}' AND key='{key(1)}'")
     with contextlib.closing(Store(path)) as opened:
         assert sum(found is None for found in entries_of(opened).values()) == 1
-        assert opened.keys(RESULTS) == {key(0), key(2), key(3)}
+        assert opened.keys(RESULTS).keys() == {key(0), key(2), key(3)}
 
 
 def test_a_disk_that_fails_for_now_is_no_reason_to_throw_anything_away(path, monkeypatch):
