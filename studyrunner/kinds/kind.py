@@ -66,6 +66,11 @@ class Kind:
         return self.marker.strip("[]") if self.marker.startswith("[") else ""
 
     @property
+    def wear_states(self) -> str:
+        """Name of the coordinate along which its results are worn, be it an axis or the slow time."""
+        return self.counted or "cycle"
+
+    @property
     def variables(self) -> Mapping[str, Variable]:
         """All that its tasks compute."""
         return {**self.asked, **self.always, **self.more}

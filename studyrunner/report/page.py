@@ -166,10 +166,10 @@ def build_page_data(result: Result, limit: float, notes: list[str]) -> dict[str,
     if result.has("cycle_count"):
         notes.append("Each point has cycle counts of its own, see cycle_count: cycle is the number of the output.")
     shown = dict(result.shown)
-    floats = limit / _CHARACTERS_A_FLOAT if result.kind.counted else math.inf
+    floats = limit / _CHARACTERS_A_FLOAT if result.has_slow_time else math.inf
     arrays, counts = _fit(_arrays(result), floats, notes)
     used = dict.fromkeys([*result.axes, *(str(dim) for array in arrays.values() for dim in array.dims)])
-    if result.kind.counted:
+    if result.has_slow_time:
         shown["cycle"] = int(np.abs(counts - result.last_reached(shown)).argmin())
     outcomes = np.unique(result.dataset["outcome"].values).tolist()
     messages = result.dataset["message"].values.ravel().tolist() if result.has("message") else []
@@ -243,7 +243,7 @@ def _encode(array: xr.DataArray, arrays: _Arrays) -> dict[str, Any]:
 def _dimension(result: Result, name: str, arrays: _Arrays) -> dict[str, Any]:
     """A dimension with its values: numbers, or words."""
     axis = next(array for array in arrays.values() if name in array.dims)[name]
-    label = result.counted if name == "cycle" and result.kind.counted else name.replace("_", " ")
+    label = result.counted if name == "cycle" and result.has_slow_time else name.replace("_", " ")
     words, values = axis.dtype.kind not in "fiu", axis.values.tolist()
     numbers = [str(each) if words else each if math.isfinite(each) else None for each in values]
     return {

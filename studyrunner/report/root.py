@@ -296,7 +296,7 @@ def find_writer(result: Result) -> Callable[[Path], int]:
         remedy = "install the library: pip install meshio"
         raise UserError("command line", "--vtu", Verbatim("needs meshio, which is not installed"), remedy)
     result = of_shown_scene(result)
-    surface = read_root(result) if result.kind.counted else None
+    surface = read_root(result) if result.has_slow_time else None
     if surface is None:
         remedy = "leave it out: the result has no mesh, no positions of its contact pairs, or no slow time"
         raise UserError("command line", "--vtu", Verbatim("nothing to draw"), remedy)

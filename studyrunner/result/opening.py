@@ -222,7 +222,7 @@ def _need(right: object, name: str, wrong: str) -> None:
 def _known_variables(dataset: xr.Dataset) -> dict[str, tuple[tuple[str, ...], Variable | None]]:
     """Of each variable that the report knows its dimensions and what it is, None for the values of an axis."""
     kind, sizes = kind_of(dataset), {str(name): size for name, size in dataset.sizes.items()}
-    slow = kind.counted or "cycle"
+    slow = kind.wear_states
     if lacking := [name for name in ("outcome", slow, "contact") if name not in dataset.variables]:
         raise Wrong("OUT.nc", None, f"holds no {' and no '.join(lacking)}; {_REMEDY}")
     axes = tuple(map(str, dataset["outcome"].dims))
@@ -278,7 +278,7 @@ def _check_variable(name: str, variable: xr.Variable, dimensions: tuple[str, ...
 
 def _check_values(dataset: xr.Dataset) -> None:
     """Tests the values that lead to other values: cycles or missions, pairs and mesh."""
-    slow = kind_of(dataset).counted or "cycle"
+    slow = kind_of(dataset).wear_states
     # worn joints whose modes are sought stand in any order
     counts = np.sort(dataset[slow].values) if slow in dataset["outcome"].dims else dataset[slow].values
     rising = counts.dtype.kind in "iuf" and counts[0] >= 0 and (np.diff(counts) > 0).all()

@@ -103,9 +103,14 @@ class Result:
         return f"{self.kind.counted}s"
 
     @property
+    def has_slow_time(self) -> bool:
+        """Whether points have a course over cycles or missions; else `cycle` is an axis, of the wear before."""
+        return bool(self.kind.counted)
+
+    @property
     def wears(self) -> bool:
         """Whether wear was asked for, and not unworn states or modes only."""
-        return bool(self.kind.counted) and (self.has("cycle_count") or bool(self.dataset["cycle"].values[-1] > 0.0))
+        return self.has_slow_time and (self.has("cycle_count") or bool(self.dataset["cycle"].values[-1] > 0.0))
 
     @property
     def followed(self) -> str:
@@ -158,7 +163,7 @@ class Result:
     def computed(self) -> Mask:
         """Points that were computed to the end."""
         # version 0.4 has kept nothing of other points than these
-        is_old = bool(self.kind.counted) and not self.has("last_cycle")
+        is_old = self.has_slow_time and not self.has("last_cycle")
         return self.ended(Outcome.CONVERGED) if is_old else self.ended(*COMPLETE)
 
     def of_points(self, name: str, cycle: int | None = None) -> NDArray[Any]:
@@ -169,8 +174,6 @@ class Result:
     @cached_property
     def last_cycle(self) -> NDArray[np.float64]:
         """Last cycle counts with values, NaN without values."""
-        if not self.kind.counted:
-            return np.where(self.computed, 0.0, np.nan)
         last = self.dataset["last_cycle"].values if self.has("last_cycle") else np.nan
         # points of an older file, or of one that was joined to this
         return np.where(self.computed & np.isnan(last), self.dataset["cycle"].values[-1], last)
@@ -178,7 +181,7 @@ class Result:
     @cached_property
     def has_values(self) -> Mask:
         """Points with values, if only of the first cycles."""
-        if not self.kind.counted:
+        if not self.has_slow_time:
             return self.computed
         return np.asarray(self.computed | (self.last_cycle >= self.dataset["cycle"].values[0]))
 
@@ -271,7 +274,7 @@ class Result:
             measures.append(1.0 / self.of_points("allowable_amplitude"))
         if self.has("worn_volume"):
             measures.append(self.worn)
-        if self.kind.counted and self.has("response_amplitude"):
+        if self.has_slow_time and self.has("response_amplitude"):
             measures.append(self.of_points("response_amplitude", 0).max(axis=-1))
         if self.has("cycle_count"):
             has_slow_time = np.isfinite(self.of_points("cycle_count", -1))
