@@ -2,6 +2,7 @@
 
 import csv
 import math
+import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
@@ -167,13 +168,13 @@ def _numbers_in(path: Path, delimiter: str, n_columns: int) -> NDArray[np.float6
     """Rows (n, n_columns) of a file of numbers alone, a row a line below the header; None of any other."""
     with path.open("rb") as file:
         n_rows = sum(1 for _ in file) - 1
-    if n_rows < 1:
-        return None
     try:
-        found = np.loadtxt(path, delimiter=delimiter, skiprows=1, comments=None, ndmin=2, encoding="utf-8-sig")
+        # of a file without rows
+        with warnings.catch_warnings(action="ignore", category=UserWarning):
+            found = np.loadtxt(path, delimiter=delimiter, skiprows=1, comments=None, ndmin=2, encoding="utf-8-sig")
     except ValueError:
         return None
-    return found if found.shape == (n_rows, n_columns) else None
+    return found if found.shape == (n_rows, n_columns) and n_rows else None
 
 
 def _parse(text: str) -> object:

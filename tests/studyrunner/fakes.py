@@ -35,10 +35,10 @@ FACTS = SceneFacts(n_displacements=6, contact=PAIRS, response_names=("tip",), di
 NO_STATE = pack(StartState(Outcome.CONVERGED, None, 1.0, Resolution((1,), 64), 0.0, 0.0)).text
 
 
-def plan_of(study: Study, n_displacements: int = 2, n_pairs: int = 1) -> TaskPlan:
-    """The tasks of a study, all of whose scenes are of this size."""
-    scenes, zero = find_scenes(study), np.zeros(n_pairs)
-    contact = replace(PAIRS, position=np.zeros((n_pairs, 3)), area=zero + 1.0, gap=zero, surface=("",) * n_pairs)
+def plan_of(study: Study, n_displacements: int = 2) -> TaskPlan:
+    """The tasks of a study, all of whose scenes have one pair and so many displacements."""
+    scenes = find_scenes(study)
+    contact = replace(PAIRS, position=np.zeros((1, 3)), area=np.ones(1), gap=np.zeros(1), surface=("",))
     facts = replace(FACTS, n_displacements=n_displacements, contact=contact)
     return build_tasks(study, scenes, [facts] * len(scenes.studies))
 
