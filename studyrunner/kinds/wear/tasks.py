@@ -44,24 +44,26 @@ def build_tasks(study: Study, points: Points, n_displacements: Sequence[int]) ->
     starts = find()
     if study.allowable:
         searches = list(_searches(study, starts, outputs))
-        works = [search.work for search in searches]
-        return TaskPlan(partial(iter, searches), works, {}, points.n)
+        return TaskPlan(partial(iter, searches), [search.work for search in searches], {}, points.n)
+    costs, times, works, alike = starts.costs, starts.an_iteration, starts.works, starts.alike()
+    # what makes sweeps and groups takes memory that is wanted below
+    del starts
     causes, n_tasks, n_integrated, seconds, longest = Counter[str](), 0, 0, 0.0, 0.0
-    for sweeps, values in starts.alike():
+    for sweeps, values in alike:
         tasks, shared = sharing(values)
         causes.update({cause: len(sweeps) * number for cause, number in shared.items()})
         n_tasks += len(sweeps) * len(tasks)
         n_integrated += len(sweeps) * sum(len(each.integrated) for each in tasks)
-        iterations, an_iteration = [each.iterations for each in tasks], starts.an_iteration[sweeps]
+        iterations, an_iteration = [each.iterations for each in tasks], times[sweeps]
         seconds += sum(iterations) * float(an_iteration.sum())
-        longest = max(longest, float((starts.costs[sweeps] + max(iterations) * an_iteration).max()))
+        longest = max(longest, float((costs[sweeps] + max(iterations) * an_iteration).max()))
     left_out = {reason: causes[cause] for cause, reason in REASONS.items() if causes[cause]}
-    n_unknowns = max(each.n_unknowns for each in starts.works)
+    n_unknowns = max(each.n_unknowns for each in works)
     work = Work("history", n_tasks, n_integrated, n_unknowns, seconds, longest)
     # found again where they are made: a plan alone takes no memory for them
     return TaskPlan(
         lambda: _make_histories(find(), sharing, outputs),
-        [*starts.works, work],
+        [*works, work],
         left_out,
         points.n,
         lambda: _make_sweeps(find()),
