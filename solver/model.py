@@ -156,14 +156,11 @@ class ContactInterface(_ByRows):
         """Of a dissipated energy (n_contact,) what may change the contact: an error of the rest does not count."""
         return energy if self.evolves else np.zeros_like(energy)
 
-    def _slope(self, name: str) -> FloatArray:
-        found = self.evolution and self.evolution.now(name)
-        return np.where(self.rubs, found[1], 0.0) if found else np.zeros(self.n_contact)
-
     @cached_property
     def friction_slope(self) -> FloatArray:
         """Change of the friction coefficient with the dissipated energy (n_contact,), m2/J."""
-        return self._slope("friction_coefficient")
+        found = self.evolution and self.evolution.now("friction_coefficient")
+        return np.where(self.rubs, found[1], 0.0) if found else np.zeros(self.n_contact)
 
     @cached_property
     def wear_factor(self) -> tuple[FloatArray, FloatArray]:

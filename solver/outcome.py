@@ -4,6 +4,7 @@ How well its result is known: an error that is not known is inf.
 """
 
 import math
+import re
 import traceback
 from enum import IntEnum
 from pathlib import Path
@@ -65,74 +66,58 @@ class Outcome(IntEnum):
     @property
     def sentence(self) -> str:
         """Sentence for the user about what has happened. The remedy depends on settings that are not known here."""
-        return self.happened + _MORE.get(self, ".")
+        return _SENTENCES[self]
 
     @property
     def happened(self) -> str:
-        """Of the sentence what has happened, without the full stop."""
-        return _HAPPENED[self]
+        """Of the sentence what has happened, without what stands behind a colon or a full stop."""
+        return re.split(r"[:.](?= |$)", self.sentence)[0]
 
 
 COMPLETE = frozenset(outcome for outcome in Outcome if outcome.complete)
 """Outcomes of points that were computed to the end."""
 
-_HAPPENED = {
-    Outcome.CONVERGED: "The point was computed to the end; see the variables of its estimated errors",
-    Outcome.STATIC_FAILED: "The static contact state was not found",
+_SENTENCES = {
+    Outcome.CONVERGED: "The point was computed to the end; see the variables of its estimated errors.",
+    Outcome.STATIC_FAILED: "The static contact state was not found: check static load, gaps and supports.",
     Outcome.START_FAILED: "No periodic vibration was found where the sweep or the nonlinear mode begins, even with the"
-    " excitation raised gradually; see the variable message",
-    Outcome.BRANCH_LOST: "The vibration could not be followed to this frequency or amplitude",
-    Outcome.MARCH_FAILED: "A step on the slow time scale did not converge, even after the step was divided",
+    " excitation raised gradually; see the variable message.",
+    Outcome.BRANCH_LOST: "The vibration could not be followed to this frequency or amplitude. A nonlinear mode may"
+    " turn back before it (a fold), meet another mode, or end where the whole joint slides.",
+    Outcome.MARCH_FAILED: "A step on the slow time scale did not converge, even after the step was divided.",
     Outcome.INACCURATE: "The point was computed to the end, but the error of a worn volume, a vibration, a wear rate,"
     " a natural frequency or a damping ratio is above rtol (see the variables of these errors), or it is not known, or"
-    " the stability of a vibration is not (see the variable message)",
-    Outcome.SENSITIVE: "The point was computed to the end, but its worn volume is not known",
-    Outcome.CERTIFICATE_FAILED: "A state was found that violates contact law or energy balance beyond the limits",
-    Outcome.UNSTABLE: "Only an unstable periodic vibration was found",
-    Outcome.PERIOD_DOUBLED: "The joint bounces, and its vibration repeats after two or more periods of the excitation",
+    " the stability of a vibration is not (see the variable message).",
+    Outcome.SENSITIVE: "The point was computed to the end, but its worn volume is not known: two computations of"
+    " nearly the same case, with other steps and another start state, differ by more than half.",
+    Outcome.CERTIFICATE_FAILED: "A state was found that violates contact law or energy balance beyond the limits.",
+    Outcome.UNSTABLE: "Only an unstable periodic vibration was found. A real joint does not stay in it.",
+    Outcome.PERIOD_DOUBLED: "The joint bounces, and its vibration repeats after two or more periods of the excitation."
+    " Such vibrations are not computed, and the vibration that repeats after one period is unstable.",
     Outcome.STEP_TOO_LONG: "A step on the slow time scale wears off so much at once that many times the normal forces"
-    " of the joint would move",
-    Outcome.NO_FINAL_STATE: "Wear does not come to an end, so the point has no final state",
-    Outcome.CONTACT_CUT_OFF: "The contact goes on beyond the modelled pairs",
-    Outcome.ADRIFT: "The whole joint slips in every period, and the mean friction does not hold its parts",
-    Outcome.UNSETTLED: "The vibration does not settle",
+    " of the joint would move. The end of this step is no result; message names the step and how long it may be.",
+    Outcome.NO_FINAL_STATE: "Wear does not come to an end, so the point has no final state. message gives its rate.",
+    Outcome.CONTACT_CUT_OFF: "The contact goes on beyond the modelled pairs: a pair at their edge carries load or"
+    " wears. Give the model pairs farther out: a bundled scene needs a larger half_width, or none, and as many more"
+    " strips or patches.",
+    Outcome.ADRIFT: "The whole joint slips in every period, and the mean friction does not hold its parts: they drift"
+    " along each other, and there is no periodic vibration. Less excitation, more friction or a stop, as"
+    " retention_stiffness of a scene, would hold them.",
+    Outcome.UNSETTLED: "The vibration does not settle: after some hundred periods it does not repeat, as happens where"
+    " the whole joint slips or opens. More static load, friction or damping, or less excitation, would help.",
     Outcome.RESONANCE_LOST: "The excitation follows the resonance, but there was no resonance in the range, or the"
-    " resonance left the range",
-    Outcome.STATIC_SLIDING: "The joint has no static state",
-    Outcome.STATIC_OPEN: "The joint has no static state",
-    Outcome.TIME_LIMIT: "The computation took longer than its time limit and was stopped",
-    Outcome.EXCEPTION: "The computation ended with an unexpected error; see the variable message",
-    Outcome.CRASHED: "The process that computed this point crashed; see the variable message",
-    Outcome.NOT_COMPUTED: "The run ended before this point was computed",
-    Outcome.SINGULAR: "The structure with its joint held is singular at a harmonic of this frequency",
+    " resonance left the range: message says where. The values before are valid.",
+    Outcome.STATIC_SLIDING: "The joint has no static state: the static load pushes a part along its contacts with more"
+    " force than friction can bear. More friction or normal force, less load, or a support would hold it.",
+    Outcome.STATIC_OPEN: "The joint has no static state: the static load lifts or tips a part off its contacts. Check"
+    " direction and place of the static load, gaps and supports.",
+    Outcome.TIME_LIMIT: "The computation took longer than its time limit and was stopped.",
+    Outcome.EXCEPTION: "The computation ended with an unexpected error; see the variable message.",
+    Outcome.CRASHED: "The process that computed this point crashed; see the variable message.",
+    Outcome.NOT_COMPUTED: "The run ended before this point was computed. The same command continues.",
+    Outcome.SINGULAR: "The structure with its joint held is singular at a harmonic of this frequency: give the"
+    " structure damping or a support.",
 }
-
-_MORE = {
-    Outcome.STATIC_FAILED: ": check static load, gaps and supports.",
-    Outcome.BRANCH_LOST: ". A nonlinear mode may turn back before it (a fold), meet another mode, or end where the"
-    " whole joint slides.",
-    Outcome.SENSITIVE: ": two computations of nearly the same case, with other steps and another start state, differ"
-    " by more than half.",
-    Outcome.UNSTABLE: ". A real joint does not stay in it.",
-    Outcome.PERIOD_DOUBLED: ". Such vibrations are not computed, and the vibration that repeats after one period is"
-    " unstable.",
-    Outcome.STEP_TOO_LONG: ". The end of this step is no result; message names the step and how long it may be.",
-    Outcome.NO_FINAL_STATE: ". message gives its rate.",
-    Outcome.CONTACT_CUT_OFF: ": a pair at their edge carries load or wears. Give the model pairs farther out: a"
-    " bundled scene needs a larger half_width, or none, and as many more strips or patches.",
-    Outcome.ADRIFT: ": they drift along each other, and there is no periodic vibration. Less excitation, more friction"
-    " or a stop, as retention_stiffness of a scene, would hold them.",
-    Outcome.UNSETTLED: ": after some hundred periods it does not repeat, as happens where the whole joint slips or"
-    " opens. More static load, friction or damping, or less excitation, would help.",
-    Outcome.RESONANCE_LOST: ": message says where. The values before are valid.",
-    Outcome.STATIC_SLIDING: ": the static load pushes a part along its contacts with more force than friction can"
-    " bear. More friction or normal force, less load, or a support would hold it.",
-    Outcome.STATIC_OPEN: ": the static load lifts or tips a part off its contacts. Check direction and place of the"
-    " static load, gaps and supports.",
-    Outcome.NOT_COMPUTED: ". The same command continues.",
-    Outcome.SINGULAR: ": give the structure damping or a support.",
-}
-"""How the sentence goes on, where it does not end."""
 
 
 def absolute(relative: ArrayLike, size: NDArray[np.float64]) -> NDArray[np.float64]:

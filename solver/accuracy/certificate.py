@@ -6,8 +6,6 @@ their Fourier series only up to the harmonics that are cut off. The truncation e
 friction coefficient 10 % too large (15 % too small), slip that does not repeat by 2 % of the friction limit.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -90,6 +88,8 @@ def certify(joint: Joint, evaluation: Evaluation) -> Certificate:
     both, friction = both[rubs], friction[rubs]
     excess = np.hypot(both[:, 1], both[:, 2]) - friction_limit(friction[:, None], both[:, 0])
     changed = law.change_force(evaluation)[largest > 0.0]
+    # of masses
+    driving = float(np.abs(evaluation.predicted_t[joint.penalty.inertial, 1:]).max(initial=0.0))
     # motion (n_contact, 3, m), m, that the contact forces cause by the stiffness of the pairs alone
     flexed = joint.to_pairs(joint.to_relative(law.motion(evaluation.force_h)))
     return Certificate(
@@ -100,7 +100,7 @@ def certify(joint: Joint, evaluation: Evaluation) -> Certificate:
         energy_error=_energy_error(joint, evaluation, flexed),
         periodicity_error=_relative(
             max(evaluation.periodicity_error, float(changed.max(initial=0.0))),
-            max(limit, law.driving_force(evaluation), float(np.abs(force_t[~rubs]).max(initial=0.0))),
+            max(limit, driving, float(np.abs(force_t[~rubs]).max(initial=0.0))),
         ),
     )
 

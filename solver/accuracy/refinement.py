@@ -6,8 +6,6 @@ below `rtol`. A state without even harmonics goes on without them; one in which 
 harmonic only, which is then exact. Masses that ratchet are brought to rest first.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from functools import reduce

@@ -17,8 +17,6 @@ Friction follows the normal force at the sample; the harmonics of the normal for
 means around each sample (`closed_fraction`).
 """
 
-from __future__ import annotations
-
 from typing import TypeVar
 
 import numpy as np

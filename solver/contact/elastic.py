@@ -2,8 +2,6 @@
 joint. The kernels are in `elastic_pairs`, the way from one state to the next in `slow_slide`.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -8,8 +8,6 @@ Derivatives have 3m columns for the harmonics of the predicted force, those of o
 state at the start of the period, and one for the friction coefficient.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

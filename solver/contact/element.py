@@ -63,6 +63,11 @@ class Marched:
         # the start of a period that was marched more than once may depend on the force
         return np.asarray((self.status_t == STICK).all(axis=1) & (self.periods == 1) & ~self.slid)
 
+    @property
+    def change(self) -> FloatArray:
+        """Size of the change of the tangential state over the period (n,), N; of masses their way, m."""
+        return np.asarray(np.hypot(*(self.state_t[:, :, -1] - self.state_t[:, :, 0]).T))
+
     def at(self, places: IntArray) -> Marched:
         """Those of some pairs (k,)."""
         of_pairs = (each.name for each in fields(Marched) if each.name != "periodicity_error")
@@ -109,18 +114,13 @@ class Element(ABC):
 
     @property
     def rate_dependent(self) -> bool:
-        """Whether the law depends on velocities."""
-        return False
+        """Whether the law depends on velocities: that of masses."""
+        return bool(self.penalty.inertial.any())
 
     @property
     def n_history(self) -> int:
         """Length of the history of a pair."""
         return 2
-
-    @property
-    def moves_on(self) -> BoolArray:
-        """Pairs (k,) whose mean position the law alone does not determine: masses."""
-        return np.full(self.places.size, self.rate_dependent)
 
     def rubbing(self, friction: FloatArray) -> Element:
         """The law with other friction coefficients of all pairs of the joint (n_contact,)."""
@@ -142,8 +142,8 @@ class Element(ABC):
 
     @property
     def state_stiffness(self) -> FloatArray:
-        """Tangential state over slip (k,), N/m."""
-        return self.penalty.tangential
+        """Tangential state over slip (k,), N/m; 1 of masses, whose state is a displacement."""
+        return np.where(self.penalty.inertial, 1.0, self.penalty.tangential)
 
     def motion(self, correction: FloatArray) -> FloatArray:
         """Motion (k, 3, m, ...), m, relative to `origin`, from predicted less contact force, N, Eq. (12)."""
@@ -239,8 +239,8 @@ class Element(ABC):
     # --- what a state leaves to the next one ---
 
     def origin(self, history: FloatArray) -> FloatArray:
-        """Mean tangential position (k, 2), m, without mean force."""
-        return np.zeros((len(history), 2))
+        """Mean tangential position (k, 2), m, without mean force: of masses their history, else 0."""
+        return np.where(self.penalty.inertial[:, None], history[:, :2], 0.0)
 
     def started_from(self, _: Marched, history: FloatArray, /) -> FloatArray:
         """The history with which the periods of a state begin after the way from another history."""
@@ -250,39 +250,38 @@ class Element(ABC):
         """History of a state without some tangential force (k, 2), N."""
         return history
 
-    def final_history(self, at: Marched, _: FloatArray, /) -> FloatArray:
-        """History that a state leaves; second argument (k, 3, m): its motion, m."""
-        return at.state_t[:, :, -1] / self.state_stiffness[:, None]
+    def final_history(self, at: Marched, motion: FloatArray, /) -> FloatArray:
+        """History that a state leaves; motion (k, 3, m): of it, m. Of masses it is their mean position."""
+        slip = at.state_t[:, :, -1] / self.state_stiffness[:, None]
+        return np.where(self.penalty.inertial[:, None], motion[:, 1:, 0], slip)
 
-    def begun_at(self, _: FloatArray, last: FloatArray, /) -> FloatArray:
+    def begun_at(self, mean: FloatArray, last: FloatArray) -> FloatArray:
         """History of pairs that had another law, whose state had a mean position and a `last` one at its end, both
         (k, 2), m.
         """
-        return np.pad(last, ((0, 0), (0, self.n_history - last.shape[1])))
+        begun = np.where(self.penalty.inertial[:, None], mean, last)
+        return np.pad(begun, ((0, 0), (0, self.n_history - last.shape[1])))
 
     # --- only masses move on in a period, and have harmonics above the highest one ---
 
-    def drift(self, at: Marched) -> FloatArray:
-        """Distance (k, 2), m, by which pairs move on in a period."""
-        return np.zeros((len(at.start), 2))
-
     def change_force(self, at: Marched) -> FloatArray:
-        """Change of the tangential state over the period (k,), N."""
-        return np.asarray(np.hypot(*(at.state_t[:, :, -1] - at.state_t[:, :, 0]).T))
-
-    def driving_force(self, _: Marched) -> float:
-        """Largest force, N, that drives a mass."""
-        return 0.0
+        """Change of the tangential state over the period (k,), N; of masses that move on the mean force of the drag."""
+        over_drift = np.where(self.penalty.inertial, self.penalty.drag * self.omega / (2.0 * np.pi), 1.0)
+        return np.asarray(over_drift * at.change)
 
     def tail(self, at: Marched, basis: FourierBasis) -> FloatArray:
-        """Contact force in other harmonics (k, 3, 2j+1), N."""
-        return np.zeros((len(at.start), 3, basis.analysis.shape[1]))
+        """Contact force on masses in other harmonics (k, 3, 2j+1), N."""
+        force_h = np.zeros((len(at.start), 3, basis.analysis.shape[1]))
+        moves = self.penalty.inertial
+        force_h[moves, 1:] = at.force_t[moves, 1:] @ basis.analysis / basis.step_mean
+        return force_h
 
-    def beyond_series(self, _: Marched, series_t: FloatArray) -> FloatArray:
-        """Tangential motion (k, 2, N), m, in harmonics that the series (k, 2, N), m, lacks, half a step before the
-        samples.
+    def beyond_series(self, at: Marched, series_t: FloatArray) -> FloatArray:
+        """Tangential motion of masses (k, 2, N), m, in harmonics that the series (k, 2, N), m, lacks, half a step
+        before the samples.
         """
-        return np.zeros_like(series_t)
+        added = np.where(self.penalty.inertial[:, None, None], at.state_t[:, :, :-1] - series_t, 0.0)
+        return np.asarray(added - added.mean(axis=2, keepdims=True))
 
 
 def numbers_of_pairs(law: Any, name: str, shape: tuple[int, ...]) -> FloatArray:

@@ -5,8 +5,6 @@ limits `F_j = (2j - 1) F / n^2` are spread evenly, and do not depend on the norm
 sliders has `k u - (k u)^2 / (4 F)` up to `u = 2 F / k`, where all slip. None of them wears.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -52,7 +50,7 @@ class IwanJoints:
         """As in `PairLaw`."""
         return np.stack([self.normal_stiffness, self.stiffness, self.stiffness], axis=1)
 
-    def element(self, places: IntArray, *of_pairs: Any) -> IwanPairs:
+    def element(self, places: IntArray, *of_pairs: Any) -> "IwanPairs":
         """As in `PairLaw`."""
         return IwanPairs(places, *of_pairs, joints=self)
 

@@ -39,10 +39,6 @@ class Elements(Element):
     def n_history(self) -> int:  # noqa: D102
         return max(each.n_history for each in self.parts)
 
-    @property
-    def moves_on(self) -> BoolArray:  # noqa: D102
-        return self._joined([each.moves_on for each in self.parts])
-
     def rubbing(self, friction: FloatArray) -> Element:  # noqa: D102
         parts = tuple(each.rubbing(friction) for each in self.parts)
         return replace(self, friction_coefficient=friction, parts=parts)
@@ -56,12 +52,8 @@ class Elements(Element):
         """Values of all pairs from those of each element."""
         return cast("A", np.take(np.concatenate(values, axis), self._order, axis))
 
-    def _each(self, compute: Callable[[Element, Marched], FloatArray], at: Marched) -> FloatArray:
-        """Values of all pairs from what each element says of its part."""
-        return self._joined([compute(each, at.at(each.places)) for each in self.parts])
-
-    def _histories(self, compute: Callable[[Element, IntArray], FloatArray]) -> FloatArray:
-        """The history of all pairs from what each element says of its places."""
+    def _each(self, compute: Callable[[Element, IntArray], FloatArray]) -> FloatArray:
+        """Values of all pairs from what each element says of its places; shorter ones end with zeros."""
         return self._joined(_padded([compute(each, each.places) for each in self.parts], 1))
 
     def march(self, predicted_h: FloatArray, history: FloatArray, before_t: FloatArray | None, /) -> Marched:  # noqa: D102
@@ -86,7 +78,7 @@ class Elements(Element):
         return force, work, by_friction
 
     def friction_work(self, at: Marched) -> FloatArray:  # noqa: D102
-        return self._each(lambda each, part: each.friction_work(part), at)
+        return self._each(lambda each, places: each.friction_work(at.at(places)))
 
     def sample_tangents(self, at: Marched, stride: int = 1) -> tuple[FloatArray, FloatArray]:  # noqa: D102
         found = [each.sample_tangents(at.at(each.places), stride) for each in self.parts]
@@ -107,39 +99,14 @@ class Elements(Element):
     def compliance(self) -> ComplexArray:  # noqa: D102
         return self._joined([each.compliance for each in self.parts])
 
-    def origin(self, history: FloatArray) -> FloatArray:  # noqa: D102
-        return self._joined([each.origin(each.own(history)) for each in self.parts])
-
-    @cached_property
-    def state_stiffness(self) -> FloatArray:  # noqa: D102
-        return self._joined([each.state_stiffness for each in self.parts])
-
     def final_history(self, at: Marched, motion: FloatArray, /) -> FloatArray:  # noqa: D102
-        return self._histories(lambda each, places: each.final_history(at.at(places), motion[places]))
+        return self._each(lambda each, places: each.final_history(at.at(places), motion[places]))
 
     def started_from(self, at: Marched, history: FloatArray, /) -> FloatArray:  # noqa: D102
-        return self._histories(lambda each, places: each.started_from(at.at(places), each.own(history)))
+        return self._each(lambda each, places: each.started_from(at.at(places), each.own(history)))
 
     def relieved(self, history: FloatArray, force: FloatArray, /) -> FloatArray:  # noqa: D102
-        return self._histories(lambda each, places: each.relieved(each.own(history), force[places]))
-
-    def begun_at(self, mean: FloatArray, last: FloatArray, /) -> FloatArray:  # noqa: D102
-        return self._histories(lambda each, places: each.begun_at(mean[places], last[places]))
-
-    def drift(self, at: Marched) -> FloatArray:  # noqa: D102
-        return self._each(lambda each, part: each.drift(part), at)
-
-    def change_force(self, at: Marched) -> FloatArray:  # noqa: D102
-        return self._each(lambda each, part: each.change_force(part), at)
-
-    def driving_force(self, at: Marched) -> float:  # noqa: D102
-        return max(each.driving_force(at.at(each.places)) for each in self.parts)
-
-    def tail(self, at: Marched, basis: FourierBasis) -> FloatArray:  # noqa: D102
-        return self._each(lambda each, part: each.tail(part, basis), at)
-
-    def beyond_series(self, at: Marched, series_t: FloatArray) -> FloatArray:  # noqa: D102
-        return self._each(lambda each, part: each.beyond_series(part, series_t[each.places]), at)
+        return self._each(lambda each, places: each.relieved(each.own(history), force[places]))
 
 
 def _padded(values: list[FloatArray], first: int) -> list[FloatArray]:

@@ -1,10 +1,7 @@
 """Friction of masses directly on rigid ground, which move by Newton's law; the kernels are in `sliding_masses`."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,19 +11,12 @@ from solver.contact.element import Marched, SampledLaw, Tangents
 from solver.contact.sliding_masses import Masses, march_masses, mass_slopes, mass_tangent, step_gains
 from solver.model import ComplexArray, FloatArray, IntArray
 
-if TYPE_CHECKING:
-    from solver.structure.fourier import FourierBasis
-
 
 @dataclass(frozen=True)
 class SlidingMasses(CoulombPairs):
     """Pairs with a mass. The state is the displacement since the start of the period, m, the history the mean position,
     which the friction alone does not determine.
     """
-
-    @property
-    def rate_dependent(self) -> bool:  # noqa: D102
-        return True
 
     @cached_property
     def masses(self) -> Masses:
@@ -46,11 +36,6 @@ class SlidingMasses(CoulombPairs):
             moving = np.sin(angle) / angle / (1j * self.omega * orders * impedance)
             found[:, 1:] = np.concatenate([1.0 / mean, moving], axis=1)[:, None, :]
         return found
-
-    @property
-    def state_stiffness(self) -> FloatArray:
-        """1, as the state is a displacement."""
-        return np.ones(len(self.places))
 
     def march(self, predicted_h: FloatArray, history: FloatArray, _: FloatArray | None, /) -> Marched:  # noqa: D102
         basis, pairs = self.basis, np.arange(len(history))
@@ -91,31 +76,3 @@ class SlidingMasses(CoulombPairs):
             found.by_speed[block] = -gain / step * by_predicted
             found.by_last_speed[block] = (by_before - loss * by_predicted) / step
         return found
-
-    def origin(self, history: FloatArray) -> FloatArray:  # noqa: D102
-        return history
-
-    def final_history(self, _: Marched, displacement_h: FloatArray, /) -> FloatArray:  # noqa: D102
-        return displacement_h[:, 1:, 0]
-
-    def begun_at(self, mean: FloatArray, _: FloatArray, /) -> FloatArray:  # noqa: D102
-        return mean
-
-    def drift(self, at: Marched) -> FloatArray:  # noqa: D102
-        return np.asarray(at.state_t[:, :, -1] - at.state_t[:, :, 0])
-
-    def change_force(self, at: Marched) -> FloatArray:
-        """Mean force of the drag on a mass that moves on in a period (k,), N."""
-        return np.asarray(self.penalty.drag * self.omega / (2.0 * np.pi) * np.hypot(*self.drift(at).T))
-
-    def driving_force(self, at: Marched) -> float:  # noqa: D102
-        return float(np.abs(at.predicted_t[:, 1:]).max(initial=0.0))
-
-    def tail(self, at: Marched, basis: FourierBasis) -> FloatArray:  # noqa: D102
-        force_h = super().tail(at, basis)
-        force_h[:, 1:] = at.force_t[:, 1:] @ basis.analysis / basis.step_mean
-        return force_h
-
-    def beyond_series(self, at: Marched, series_t: FloatArray) -> FloatArray:  # noqa: D102
-        added = at.state_t[:, :, :-1] - series_t
-        return np.asarray(added - added.mean(axis=2, keepdims=True))

@@ -17,8 +17,6 @@ Results of a step are (friction (2), velocity after the step (2), mean velocity 
 (5, 5) those of (friction, velocity after, mean speed) by (force (2), velocity before (2), friction limit).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

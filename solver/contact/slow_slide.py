@@ -15,8 +15,6 @@ the first.
 Floats and arrays only.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

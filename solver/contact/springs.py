@@ -1,7 +1,5 @@
 """Springs that stiffen, `lambda = k_1 u + k_3 u^3` in each direction of a pair, without friction or separation."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 
@@ -35,7 +33,7 @@ class CubicSprings:
         """As in `PairLaw`: k_1."""
         return self.linear
 
-    def element(self, places: IntArray, *of_pairs: Any) -> SpringPairs:
+    def element(self, places: IntArray, *of_pairs: Any) -> "SpringPairs":
         """As in `PairLaw`."""
         return SpringPairs(places, *of_pairs, springs=self)
 

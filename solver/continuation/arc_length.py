@@ -8,14 +8,11 @@ from functools import cached_property
 
 import numpy as np
 
-from solver.continuation.natural import FINE_STEP, LARGEST_STEP_RATIO, NEAR_ITERATIONS, SMOOTH_CHANGE
+from solver.continuation.natural import FINE_STEP, LARGEST_STEP_RATIO, NEAR_ITERATIONS, SMALL_CHANGE, SMOOTH_CHANGE
 from solver.harmonic_balance.dlft import Balance, Evaluation, Linearisation
 from solver.harmonic_balance.state import State, state_of
 from solver.model import FloatArray
 from solver.newton.run import SHORTEST_STEP, Bordered, Run
-
-FIRST_ARC = SMOOTH_CHANGE / 10.0
-"""Length of the first step, in unknowns over the norm of the first predicted force; the longest is `SMOOTH_CHANGE`."""
 
 SHORTEST_ARC = FINE_STEP / 10.0
 """Shortest step: where none of this length converges, the branch has a corner."""
@@ -45,7 +42,7 @@ class Arc:
 
         toward: sign of the first change of the parameter.
         """
-        state, length = self.start, FIRST_ARC
+        state, length = self.start, SMALL_CHANGE
         along = np.zeros(state.evaluation.predicted_h.size + 1)
         along[-1] = toward
         tangent = self.tangent(state, along)

@@ -29,6 +29,11 @@ SMOOTH_CHANGE = 0.2
 """Largest change over a smooth step of a branch, of the phase lag in rad; a fold with a smaller change is a corner.
 Half the value takes up to 50 % more iterations; twice the value leads to equal states."""
 
+SMALL_CHANGE = SMOOTH_CHANGE / 10.0
+"""Change over a step of a relaxation below which a periodic state is sought, of the first arc-length step over the
+norm of the first predicted force, and most of a frequency that is an unknown in an iteration. Half and twice: followed
+resonance and peak of the slider are equal within 5e-4."""
+
 FINE_STEP = 1e-3
 """Length over which the end or a corner of a branch is located, over the parameter, the cycle count or the force along
 the branch: there a sweep is left to its rescue, and no shorter step is made but of a sweep. Also the first load factor
@@ -139,7 +144,7 @@ def ratchets(joint: Joint, at: Evaluation, fraction: float) -> bool:
     ratchet in each period although the Fourier series are periodic. This slip counts as wear, but its work is not in
     the balance of energy.
     """
-    work = float(np.abs(at.force_h[:, 0, 0]) @ np.hypot(*joint.law.drift(at).T))
+    work = float(np.abs(at.force_h[:, 0, 0]) @ np.where(joint.penalty.inertial, at.change, 0.0))
     return work > fraction * float(at.slip_work.sum())
 
 
@@ -161,9 +166,8 @@ def shake_down(joint: Joint, state: State, fraction: float, run: Run) -> State:
 def _shifted(joint: Joint, state: State, run: Run) -> tuple[State, bool]:
     """As `follow_naturally`, along the history of the masses from that of a state to that which the state leaves."""
     at = state.evaluation
-    shift = np.where(
-        joint.law.moves_on[:, None], joint.law.final_history(at, at.displacement_h) - at.start_history, 0.0
-    )
+    left = joint.law.final_history(at, at.displacement_h)
+    shift = np.where(joint.penalty.inertial[:, None], left - at.start_history, 0.0)
 
     def balance_from(part: float, _: State) -> Balance:
         return Balance(joint, at.start_history + part * shift, at.wear_depth, energy=at.energy)

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from solver.continuation.natural import ATTEMPTS, SMOOTH_CHANGE
+from solver.continuation.natural import ATTEMPTS, SMALL_CHANGE, SMOOTH_CHANGE
 from solver.harmonic_balance.dlft import Balance, Evaluation, Linearisation
 from solver.harmonic_balance.state import first_response
 from solver.model import ComplexArray, FloatArray
@@ -23,10 +23,6 @@ from solver.settings import DIFFERENCE, NEGLIGIBLE, ROUND_OFF
 from solver.structure.condensation import FrequencySlope, frequency_slope
 from solver.structure.fourier import to_complex
 from solver.structure.joint import Case, Joint
-
-LARGEST_FREQUENCY_CHANGE = SMOOTH_CHANGE / 10.0
-"""Largest change of the frequency in an iteration, over the frequency. Half and twice: followed resonance and peak of
-the slider are equal within 5e-4."""
 
 PEAK_RISE = 2.0
 """Largest rise of the logarithm of the response with the phase lag, 1/rad, over rtol, at which an amplitude counts as
@@ -74,7 +70,7 @@ class _AtLag:
         return self._errors(_changes(here.balance.joint, tangent.rest_and_motion(step)[1])[0], here.extra)
 
     def fraction(self, here: Bordered, change: FloatArray) -> float:
-        return min(1.0, LARGEST_FREQUENCY_CHANGE * float(here.values[0] / max(abs(change[0]), 1e-300)))
+        return min(1.0, SMALL_CHANGE * float(here.values[0] / max(abs(change[0]), 1e-300)))
 
     def _errors(self, part: complex, product: complex) -> FloatArray:
         """-Im(exp(i lag) part) / |product| (1,)."""

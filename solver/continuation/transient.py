@@ -18,7 +18,7 @@ from typing import cast
 
 import numpy as np
 
-from solver.continuation.natural import NEAR_ITERATIONS, SMOOTH_CHANGE
+from solver.continuation.natural import NEAR_ITERATIONS, SMALL_CHANGE, SMOOTH_CHANGE
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.state import Failure, State
 from solver.model import ComplexArray, FloatArray, Matrix
@@ -40,9 +40,6 @@ settle ends after 600 to 740 by its steps."""
 
 RUNAWAY = 1e3
 """Displacement over the largest one of vibration and start; above it parts run away."""
-
-RELAXED_CHANGE = SMOOTH_CHANGE / 10.0
-"""Change of the motion over a step below which a periodic state is sought."""
 
 
 @dataclass(frozen=True)
@@ -147,7 +144,7 @@ def relax_to_periodic(joint: Joint, worn: FloatArray, start: State, start_joint:
             return Failure(Outcome.ADRIFT, f"{at} contact pair {int(moved[:, :, 0].max(axis=1).argmax())} runs away")
         # a next attempt only where the motion changes less: Newton's method fails from a motion that still changes
         renewed = change < 0.5 * tried or length >= longest
-        if change < RELAXED_CHANGE and renewed:
+        if change < SMALL_CHANGE and renewed:
             tried = change
             before = budget.iterations
             # with ten iterations two of 64 samples of the dovetail (16 pairs, 212.45 Hz) end as `march_failed`
@@ -157,7 +154,7 @@ def relax_to_periodic(joint: Joint, worn: FloatArray, start: State, start_joint:
                 grows = True
             elif found and _change(transient.periodic(found.evaluation), motion) < SMOOTH_CHANGE:
                 return found
-        elif change > RELAXED_CHANGE:
+        elif change > SMALL_CHANGE:
             tried = np.inf
         # amplitudes have no meaning over less than a period: steps are shorter only where Newton's method fails
         growth = float(np.clip(SMOOTH_CHANGE / max(change, 1e-300), 0.5, 2.0))

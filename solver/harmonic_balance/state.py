@@ -1,7 +1,5 @@
 """A converged state: the history that it leaves, other harmonics, its responses; or a failure."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from functools import lru_cache

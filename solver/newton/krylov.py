@@ -4,8 +4,6 @@ The operator may be singular, as the Jacobian of a joint that slips as a whole. 
 and GMRES stops at stagnation, with the least-squares solution without a part in the null space.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

@@ -3,8 +3,6 @@
 A small Jacobian is factorised, a large one is solved by GMRES with an earlier factorisation, corrected where GMRES was.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
@@ -105,12 +103,6 @@ def build_dense_factor(tangent: Linearisation, shift: float) -> DenseFactor:
     return DenseFactor(rows, factor, width == m)
 
 
-def build_factor(tangent: Linearisation, *, dense: bool = False) -> Factor:
-    """A march through the period, or dense factors: if wanted, for small joints, masses, where a sample is singular."""
-    dense = dense or tangent.joint.component_index.size <= SMALL_JOINT
-    return (None if dense else build_period_factor(tangent)) or build_dense_factor(tangent, NEUTRAL_SHIFT)
-
-
 @dataclass
 class JacobianSolver:
     """Solver of systems with a `Linearisation` that keeps one factorisation, corrected, between its calls."""
@@ -124,9 +116,13 @@ class JacobianSolver:
         return self._factor if self._resolution == tangent.joint.resolution else None
 
     def _renewed(self, tangent: Linearisation, *, dense: bool = False) -> Factor:
-        """A factorisation of this Jacobian, kept from now on."""
+        """A factorisation of this Jacobian, kept from now on: a march through the period, or dense factors, if wanted,
+        for small joints, masses, and where a sample is singular.
+        """
         self._resolution, self._corrections = tangent.joint.resolution, ()
-        self._factor = build_factor(tangent, dense=dense)
+        dense = dense or tangent.joint.component_index.size <= SMALL_JOINT
+        march = None if dense else build_period_factor(tangent)
+        self._factor = march or build_dense_factor(tangent, NEUTRAL_SHIFT)
         return self._factor
 
     def solve(

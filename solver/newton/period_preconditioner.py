@@ -16,8 +16,6 @@ to GMRES. CPU s of a history of the dovetail, and with a factorisation of the mo
 pairs 4.8 and 10.5, 336 pairs 35 and 59.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import NamedTuple

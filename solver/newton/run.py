@@ -4,8 +4,6 @@ A balance may have k further unknowns q and k further equations, R(p, q) = 0 and
 of an arc-length step, the frequency at a given phase lag, frequency, damping and drive of a nonlinear mode.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol, TypeVar
@@ -192,11 +190,11 @@ class Run:
     budget: Budget = field(default_factory=Budget)
     solver: JacobianSolver = field(default_factory=JacobianSolver, repr=False)
 
-    def fresh(self) -> Run:
+    def fresh(self) -> "Run":
         """A part of the computation whose results do not depend on an earlier factorisation."""
         return Run(self.tolerance, self.budget)
 
-    def with_tolerance(self, tolerance: float) -> Run:
+    def with_tolerance(self, tolerance: float) -> "Run":
         """The same run with another tolerance."""
         return replace(self, tolerance=tolerance)
 

@@ -14,8 +14,6 @@ equal distances in theta are integrated, with the m parts of smallest |n|; m = N
 differently. After a period over m each sector is where the next one was, with the m-th root of the multipliers.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple

@@ -16,8 +16,6 @@ Disturbances of a travelling wave are those of m sectors (`disturbances`): all o
 otherwise those of the nodal diameters 0 and d. Other waves beside the excited one are not tested.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import lru_cache

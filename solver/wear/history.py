@@ -7,11 +7,11 @@ from functools import partial
 from typing import Any
 
 import numpy as np
-import scipy.linalg
 
 from solver.accuracy.certificate import NOT_CERTIFIED
 from solver.harmonic_balance.state import Failure
 from solver.model import ContactInterface, FloatArray, IntArray, ReducedModel
+from solver.modes.modal_model import linear_mode
 from solver.packing import Packed
 from solver.results.history import StartState, WearHistory, first_cut_off, judge, last_error
 from solver.results.state_report import LOOP_PHASES
@@ -74,18 +74,15 @@ def describe_lag(model: ReducedModel, history: WearHistory, rows: IntArray) -> s
     cycles at the last rate are missing. n: within which a vibration of the stuck structure falls to 1/e, by its mode
     next to the frequency; slip damps more, so that it is less. rows: known counts.
     """
-    last = rows[-1:]
+    last, stuck = rows[-1:], np.ones(model.contact.n_contact, bool)
     if not last.size or model.contact.relative_change(history.dissipated_energy[last[0]]) == 0.0:
         return ""
-    linear = model.harmonic_structure(1)
-    inner = np.setdiff1d(np.arange(len(linear.mass)), model.contact.dofs)
-    mass, stiffness, damping = (each[np.ix_(inner, inner)] for each in (linear.mass, linear.stiffness, linear.damping))
-    if not inner.size or not (volume := float(history.worn_volume[last[0]])) > 0.0:
+    if not (volume := float(history.worn_volume[last[0]])) > 0.0:
         return ""
     omega = 2.0 * math.pi * float(history.excitation_frequency[last[0]])
-    squares, modes = scipy.linalg.eigh(stiffness, mass)
-    near = int(np.abs(np.sqrt(np.abs(squares)) - omega).argmin())
-    decay = 0.5 * float(np.real(modes[:, near].conj() @ damping @ modes[:, near]))
+    if (mode := linear_mode(model, stuck, near=omega)) is None:
+        return ""
+    decay = mode.damping_ratio * mode.omega
     periods = omega / (2.0 * math.pi * decay) if decay > 0.0 else math.inf
     begun, ended = history.wear_rate[rows[[0, -1]]].tolist()
     off = abs(ended - begun) * min(periods, float(history.cycles[last[0]])) / volume

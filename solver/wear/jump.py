@@ -47,12 +47,9 @@ def _with_hold(wearing: WearingJoint, state: WearState, worn: FloatArray, *, dri
         return None
     joint = replace(state.point, hold=hold).joint(wearing.case)
     point = wearing.run.state(Balance(joint, state.point.next_history, worn[0], energy=worn[1]), state.at.predicted_h)
-    if point is None or not wearing.run.is_stable(joint, point.evaluation):
+    if point is None or not wearing.run.is_stable(joint, at := point.evaluation):
         return None
-    if (
-        creeps(joint.after(point.evaluation.energy), hold, point.evaluation)
-        or vibration_change(state.at, point.evaluation) > OTHER_BRANCH
-    ):
+    if creeps(joint.after(at.energy), hold, at) or vibration_change(state.at, at) > OTHER_BRANCH:
         return None
     # without a factorisation of the joint without a hold
     wearing.run = wearing.run.fresh()

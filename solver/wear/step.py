@@ -58,7 +58,7 @@ def attempt_step(wearing: WearingJoint, state: WearState, length: float, scheme:
         given = now + w**2 / (1.0 + 2.0 * w) * grown
         implicit_cycles = (1.0 + w) / (1.0 + 2.0 * w) * length
     start = wearing.joint_of(state), state.point.next_history, given[0], wearing.gain(implicit_cycles)
-    more = wearing.wearing_work(state), state.at.predicted_t, given[1], wearing.energy_gain(implicit_cycles)
+    more = wearing.wearing_work(state), state.at.predicted_t, given[1], implicit_cycles / wearing.area
     balance, predicted = first_guess(wearing, state, Balance(*start, *more), length)
     end = wearing.solve(balance, predicted, state)
     if end is None or _surprise(state, end, predicted) > SMOOTH_CHANGE or _runs_away(state, end):

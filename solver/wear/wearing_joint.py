@@ -8,8 +8,6 @@ A followed frequency is an unknown with one more equation: a given phase lag of 
 amplitude (`solver.continuation.phase_lag`).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -81,7 +79,7 @@ class WearRequest:
         """Last cycle count; inf where it is not known."""
         return math.inf if isinstance(self.cycles, ToTheEnd) else float(self.cycles[-1])
 
-    def adaptive_to(self, counts: FloatArray) -> WearRequest:
+    def adaptive_to(self, counts: FloatArray) -> "WearRequest":
         """The same with adaptive steps, to the last of some counts (n,), whatever target is reached before."""
         never = self.until and replace(self.until, value=math.inf)
         return replace(self, steps=None, cycles=counts, until=never)
@@ -261,10 +259,6 @@ class WearingJoint:
         rate = self.joint_of(state).contact.relative_change(state.energy_rate)
         slips = state.at.slip_work.sum() > ROUND_OFF * slip_at_most(state.at)
         return rate if slips else 0.0
-
-    def energy_gain(self, cycles: float) -> FloatArray:
-        """Growth of the dissipated energy over the work of friction (n_contact,), 1/m2, in h cycles."""
-        return cycles / self.area
 
     def solve(
         self, balance: Balance, start: FloatArray, state: WearState, most: int = NEAR_ITERATIONS

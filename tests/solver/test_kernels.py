@@ -100,7 +100,7 @@ MASS, DRAG, MASS_OMEGA = 0.7, 0.21, 3.0  # kg, N s/m, rad/s
 def run_mass(predicted_h, n_samples, both=True):
     """The period of a mass with one tangent or both: friction force (2, m) by harmonics, and slip work."""
     nothing = np.zeros(1)
-    penalty = Penalty(nothing + 1.0, nothing, nothing > 0.0, nothing + MASS, nothing + DRAG, nothing)
+    penalty = Penalty(nothing + 1.0, nothing, nothing == 0.0, nothing + MASS, nothing + DRAG, nothing)
     of = np.arange(1), penalty, nothing + FRICTION, np.array([[0, 1, 2 if both else -1]])
     found = SlidingMasses(*of, build_basis(ORDERS, n_samples), MASS_OMEGA).march(
         predicted_h[None], np.zeros((1, 2)), None
