@@ -14,8 +14,9 @@ For use in Python, from this package itself:
 - `integrate_mission`: wear over missions, each a list of `Block`, steady or a `Passage`, a `MissionHistory`;
 - `response_curve`: a whole curve over frequency or excitation amplitude, with folds, unstable parts and Floquet
   multipliers, a `ResponseCurve`;
-- `balance_of`: the equations of a periodic state, a `HarmonicBalance`, with residual, exact Jacobian, and all Fourier
-  coefficients and time signals of a state as a `PeriodicMotion`;
+- `balance_of`: the equations of a periodic state, a `HarmonicBalance`, with residual, exact Jacobian, all Fourier
+  coefficients and time signals of a state as a `PeriodicMotion`, and its sensitivities to all parameters as a
+  `Gradient`;
 - `SolverSettings`: resolution and accuracy; `Outcome`: how a computation ended.
 
 `CONTRIBUTING.md` has a map of the rooms. `PHYSICS.md` has the equations in one sign convention, the misprints of the
@@ -47,6 +48,7 @@ if TYPE_CHECKING:
     from solver.nonlinear_modes import backbone as backbone
     from solver.nonlinear_modes import modal_response as modal_response
     from solver.outcome import Outcome as Outcome
+    from solver.results.gradient import Gradient as Gradient
     from solver.results.history import WearHistory as WearHistory
     from solver.results.state_report import PeriodicMotion as PeriodicMotion
     from solver.settings import Passage as Passage
@@ -68,6 +70,7 @@ _NAMES = {
     "model_from_matrices": "build_model",
     "nonlinear_modes": "Backbone ModalResponse backbone modal_response",
     "outcome": "Outcome",
+    "results.gradient": "Gradient",
     "results.history": "WearHistory",
     "results.state_report": "PeriodicMotion",
     "settings": "Passage SolverSettings WearTarget",

@@ -13,6 +13,7 @@ from solver.loading_history.start_states import FrequencySweep
 from solver.model import ComplexArray, FloatArray, IntArray, ReducedModel
 from solver.outcome import Ended, Outcome, check, is_known_to
 from solver.presentation import Presented
+from solver.results.gradient import Gradient, gradient_of
 from solver.results.history import StartState, describe_cut_off, first_cut_off
 from solver.results.state_report import PeriodicMotion, evaluated, periodic_motion
 from solver.settings import Direction, SolverSettings
@@ -87,6 +88,24 @@ class HarmonicBalance(Ended):
     def motion(self, z: ArrayLike | None = None) -> PeriodicMotion:
         """Fourier coefficients and time signals of z, of `state` if not given; errors as in `residual`."""
         return periodic_motion(self._balance.joint, self._evaluate(self.state if z is None else z))
+
+    def gradient(
+        self, response: int = 0, *, wear_coefficient: float | None = None, contact_stiffness: ArrayLike = math.inf
+    ) -> Gradient:
+        """How the amplitude of a response changes with all parameters along `state`; or, where a wear coefficient is
+        given, 1/Pa, the wear rate of Archard's law.
+
+        contact_stiffness: that of the model, N/m3, one number or (n_contact,); inf for a rigid contact.
+        Raises ValueError where there is no state, or a number is out of its range; numpy.linalg.LinAlgError at a fold.
+        """
+        n_responses, joint = len(self._balance.joint.model.response_names), self._balance.joint
+        check("response", 0 <= response < n_responses, f"give 0 to {n_responses - 1}")
+        if wear_coefficient is not None:
+            wear_coefficient = check_number("wear_coefficient", wear_coefficient, least=0.0)
+        stiffness = np.asarray(contact_stiffness, np.float64)
+        right = stiffness.shape in ((), (joint.contact.n_contact,)) and bool((stiffness > 0.0).all())
+        check("contact_stiffness", right, "give a number above 0, N/m3, or one of each pair")
+        return gradient_of(self._balance, self._evaluate(self.state), response, wear_coefficient, stiffness)
 
     def _evaluate(self, z: ArrayLike) -> Evaluation:
         given = np.array(z, np.float64)

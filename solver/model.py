@@ -177,10 +177,14 @@ class ContactInterface(_ByRows):
         found = evolution and evolution.now("contact_stiffness")
         if not evolution or evolution.contact_stiffness is None or not found:
             return np.zeros((self.n_contact, 3)), np.zeros((self.n_contact, 3))
-        stiffness, slope = found
-        share = self.rubs[:, None] / (self.area[:, None] * np.array([1.0, TANGENTIAL_RATIO, TANGENTIAL_RATIO]))
-        first = evolution.contact_stiffness[:, 0]
+        (stiffness, slope), first, share = found, evolution.contact_stiffness[:, 0], self.flexibility_share
         return (1.0 / stiffness - 1.0 / first)[:, None] * share, (-slope / stiffness**2)[:, None] * share
+
+    @cached_property
+    def flexibility_share(self) -> FloatArray:
+        """Flexibility, m/N, over the inverse contact stiffness, m3/N (n_contact, 3), of pairs that rub."""
+        ratios = np.array([1.0, TANGENTIAL_RATIO, TANGENTIAL_RATIO])
+        return np.asarray(self.rubs[:, None] / (self.area[:, None] * ratios))
 
     def relative_change(self, energy: FloatArray) -> float:
         """Largest relative change of the contact by a change of the energy (n_contact,), J/m2, in the steepest part of

@@ -149,6 +149,10 @@ class Element(ABC):
         """Motion (k, 3, m, ...), m, relative to `origin`, from predicted less contact force, N, Eq. (12)."""
         return _scaled(correction, self.compliance)
 
+    def motion_transposed(self, weight: FloatArray) -> FloatArray:
+        """The transpose of `motion`, as a real matrix, times (k, 3, m)."""
+        return _scaled(weight, self.compliance.conj())
+
     def force(self, motion: FloatArray) -> FloatArray:
         """Predicted less contact force (k, 3, m), N, of a motion, m, Eqs. (10), (12); undoes `motion`."""
         return _scaled(motion, 1.0 / self.compliance)

@@ -148,7 +148,8 @@ def frequency_derivative(balance: Balance, at: Evaluation) -> FrequencySlope:
     ahead = replace(balance, joint=replace(joint, omega=joint.omega + length)).evaluate(at.predicted_h)
     product, response = _changes(joint, (joint.motion(ahead) - joint.motion(at)) / length)
     force = slope.force + (ahead.residual - at.residual) / length
-    return FrequencySlope(force, slope.product + product, slope.response + response)
+    work = (ahead.slip_work - at.slip_work) / length
+    return FrequencySlope(force, slope.product + product, slope.response + response, work)
 
 
 def _changes(joint: Joint, motion_h: FloatArray) -> tuple[complex, ComplexArray]:

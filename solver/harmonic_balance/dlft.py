@@ -149,7 +149,8 @@ class Balance:
         )
         flexibility, softens = contact.flexibility
         eased = (softens[:, :, None] * at.force_h).reshape(energy_tangent.shape)
-        return Linearisation(self.joint, at, force_tangent, growth_tangent, flexibility, eased, energy_tangent)
+        tangents = force_tangent, growth_tangent, flexibility, eased, energy_tangent, work_tangent, by_friction
+        return Linearisation(self.joint, at, *tangents)
 
 
 @packable
@@ -205,6 +206,7 @@ class Linearisation:
     growth_tangent, energy_tangent (n_contact, 3m): derivatives of the wear depth, m/N, which is a part of the static
     normal motion, and of the dissipated energy, 1/m2. flexibility (n_contact, 3): motion of the structure over contact
     force, m/N, beside that of the contact; eased (n_contact, 3m): that motion over the dissipated energy, m3/J.
+    work_tangent, by_friction: of the slip work, and by the friction coefficient, as in `Tangents`.
     Columns of pairs that stick during the whole period, without flexibility, are those of the identity: only `active`
     pairs are coupled.
     """
@@ -216,6 +218,8 @@ class Linearisation:
     flexibility: FloatArray
     eased: FloatArray
     energy_tangent: FloatArray
+    work_tangent: FloatArray
+    by_friction: FloatArray
 
     @property
     def motion_tangent(self) -> FloatArray:
@@ -254,6 +258,24 @@ class Linearisation:
         by_energy = self.eased, self.energy_tangent
         blocks = self.force_tangent, joint.law.compliance, self.growth_tangent, self.flexibility, by_energy
         return untransmitted(np.ascontiguousarray(step), joint.contact.pair_rows, self.active, *blocks)
+
+    def apply_transposed(self, weight: FloatArray) -> FloatArray:
+        """Transposed Jacobian times y (n_rel, m)."""
+        return self.by_predicted_force(self.joint.structure.apply_transposed(weight), weight)
+
+    def by_predicted_force(self, on_motion: FloatArray, on_force: FloatArray) -> FloatArray:
+        """Derivative (n_rel, m), per N, of a scalar with derivatives a by the motion of the structure, per m, and b by
+        the contact force, per N, both (n_rel, m): `motion_tangent^T a + force_tangent^T b`.
+        """
+        joint, places = self.joint, self.active
+        moved, forced = joint.to_pairs(on_motion), joint.to_pairs(on_force)
+        back, eased = joint.law.motion_transposed(moved), (self.eased * moved.reshape(self.eased.shape)).sum(axis=1)
+        through = (forced - back + self.flexibility[:, :, None] * moved).reshape(len(eased), -1)
+        found = np.einsum("pij,pi->pj", self.force_tangent[places], through[places])
+        found += self.growth_tangent[places] * moved[places, 0, :1] + self.energy_tangent[places] * eased[places, None]
+        # the other pairs transmit the predicted force, and do not move
+        forced[places] = back[places] + found.reshape(forced[places].shape)
+        return joint.to_relative(forced)
 
     def dense(self, pairs: IntArray, width: int | None = None) -> FloatArray:
         """Rows and columns (displacement, coefficient) of the Jacobian for some pairs and their first `width`

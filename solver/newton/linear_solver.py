@@ -77,13 +77,15 @@ class DenseFactor:
         swaps = np.count_nonzero(pivots != np.arange(pivots.size))
         return float(np.prod(np.sign(np.diag(triangle))) * (-1.0) ** swaps)
 
-    def solve(self, right: FloatArray) -> FloatArray:
-        """Solution (n_rel, m), approximate unless `exact`, for a right-hand side (n_rel, m)."""
+    def solve(self, right: FloatArray, *, transposed: bool = False) -> FloatArray:
+        """Solution (n_rel, m), approximate unless `exact`, for a right-hand side (n_rel, m); transposed: with the
+        transposed Jacobian.
+        """
         found = right.copy()
         if self.rows.size:
             width = len(self.factor[1]) // self.rows.size
             inside = right[self.rows, :width].ravel()
-            solved = scipy.linalg.lapack.dgetrs(*self.factor, inside)[0]
+            solved = scipy.linalg.lapack.dgetrs(*self.factor, inside, trans=int(transposed))[0]
             found[self.rows, :width] = solved.reshape(-1, width)
         return found
 
@@ -143,6 +145,28 @@ class JacobianSolver:
                 # the columns of all other unknowns are those of the identity
                 step[rest] = (right - tangent.apply(step, roughly=True))[rest]
         return steps
+
+    def solve_transposed(self, tangent: Linearisation, right: FloatArray, residual: float = FORCING) -> FloatArray:
+        """Solution y (n_rel, m) of `J^T y = right`, to a relative residual; the kept factorisation is not used.
+
+        Exact by dense factors of all coefficients; else by GMRES with dense factors of the lowest ones.
+        Raises numpy.linalg.LinAlgError where GMRES does not converge, or the Jacobian is singular.
+        """
+        rest = tangent.passive_rows
+        factor, found = build_dense_factor(tangent, 0.0), np.zeros_like(right)
+        # the rows of passive unknowns, transposed, are those of the identity
+        found[rest] = right[rest]
+        missing, solved = right - tangent.apply_transposed(found), abs(factor.sign) == 1.0
+
+        def product(vector: FloatArray) -> FloatArray:
+            return tangent.apply_transposed(factor.solve(vector.reshape(right.shape), transposed=True)).ravel()
+
+        if solved and not factor.exact:
+            solution, solved, *_ = solve_gmres(product, missing.ravel(), residual, MOST_PRODUCTS)
+            missing = solution.reshape(right.shape)
+        if not solved:
+            raise np.linalg.LinAlgError("the transposed Jacobian cannot be inverted")
+        return found + factor.solve(missing, transposed=True)
 
     def _solve_large(self, tangent: Linearisation, right: FloatArray, residual: float) -> FloatArray:
         """Solution in the rows of the active pairs, with an earlier factorisation while products are few."""

@@ -75,6 +75,10 @@ class CondensedStructure:
         moving = self.moving.single if roughly else self.moving
         return from_complex(self.static_stiffness @ displacement_h[:, 0], moving.apply(displacement_h))
 
+    def apply_transposed(self, force_h: FloatArray) -> FloatArray:
+        """The transpose of `apply`, as a real matrix, times y (n_rel, 2H+1)."""
+        return from_complex(self.static_stiffness.T @ force_h[:, 0], self.moving.apply_transposed(force_h))
+
     def response_h(self, displacement_h: FloatArray) -> FloatArray:
         """Responses (n_response, 2H+1), m, from u (n_rel, 2H+1), m."""
         moving = np.ascontiguousarray(to_complex(displacement_h).T)[:, :, None]
@@ -258,12 +262,13 @@ class FrequencySlope:
     """Derivatives by the frequency, rad/s, at given relative displacements u and contact forces.
 
     force (n_rel, 2H+1): of `Z_r u - F_r`, N. product: of `F^H x` in harmonic 1, N m. response (n_response,): of the
-    responses in harmonic 1, m.
+    responses in harmonic 1, m. slip_work (n_contact,): of that of the pairs, J, where they are masses.
     """
 
     force: FloatArray
     product: complex
     response: ComplexArray
+    slip_work: FloatArray
 
 
 def _factorised(matrix: ComplexArray) -> Callable[[ComplexArray], ComplexArray]:
@@ -306,4 +311,5 @@ def frequency_slope(
         force[:, place] = slope[relative] + full[np.ix_(relative, others)] @ turned[others]
         if n == 1:
             product, response = complex(load.conj() @ turned), linear.response @ turned
-    return FrequencySlope(from_complex(np.zeros(relative.size), force), product, response)
+    still = np.zeros(relative.size), np.zeros(model.contact.n_contact)
+    return FrequencySlope(from_complex(still[0], force), product, response, still[1])

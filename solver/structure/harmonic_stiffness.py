@@ -7,7 +7,7 @@ from typing import cast
 import numpy as np
 
 from solver.model import ComplexArray, FloatArray, IntArray, LinearModel
-from solver.structure.fourier import to_complex
+from solver.structure.fourier import from_complex, to_complex
 
 
 @dataclass(frozen=True)
@@ -20,6 +20,11 @@ class DenseStiffness:
         """Amplitudes (n_rel, H), N, of `Z_r u` from u (n_rel, 2H+1), m."""
         moving = np.ascontiguousarray(to_complex(displacement_h).T, self.dense.dtype)[:, :, None]
         return cast("ComplexArray", np.matmul(self.dense, moving)[:, :, 0].T)
+
+    def apply_transposed(self, force_h: FloatArray) -> ComplexArray:
+        """Amplitudes (n_rel, H) of the conjugate transpose of Z_r, which is the transposed real matrix, times y."""
+        moving = np.ascontiguousarray(to_complex(force_h).T)[:, None, :]
+        return cast("ComplexArray", np.matmul(moving.conj(), self.dense)[:, 0, :].conj().T)
 
     @cached_property
     def single(self) -> "DenseStiffness":
@@ -73,6 +78,10 @@ class SharedStiffness:
         forces = self._product(columns, to_complex(displacement_h))
         behind = np.matmul(self.inner_compliance, forces[n_rel:].T[:, :, None])[:, :, 0].T
         return forces[:n_rel] - self._product(back, behind)
+
+    def apply_transposed(self, force_h: FloatArray) -> ComplexArray:
+        """As in `DenseStiffness`: a real structure is symmetric."""
+        return np.conj(self.apply(from_complex(force_h[:, 0], np.conj(to_complex(force_h)))))
 
     @cached_property
     def single(self) -> "SharedStiffness":
