@@ -91,7 +91,7 @@ class Case:
 
 def coupon() -> Iterator[Case]:
     """A cylinder on a flat: by theory, by others, and as measured."""
-    mu, settings = 0.6, SolverSettings(5, 64)
+    mu, settings = 0.6, SolverSettings(13, 128)
     for share in (0.5, 0.75):
         radius, load, modulus = 6e-3, 1.2e5, 200e9 / (2.0 * (1.0 - 0.3**2))
         a = math.sqrt(4.0 * load * radius / (math.pi * modulus))
