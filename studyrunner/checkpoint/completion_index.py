@@ -50,7 +50,7 @@ class CompletionIndex:
 
     def read_results(self, names: Sequence[str]) -> tuple[NDArray[np.void], NDArray[np.bool_]]:
         """Records (n,) of the results with these hashes, whether each exists; else NaN, or 0. Raises StorageError."""
-        contents = np.frombuffer(bytearray(self._empty * len(names)), np.uint8).reshape(len(names), -1)
+        contents = np.frombuffer(bytearray(self._empty) * len(names), np.uint8).reshape(len(names), -1)
         there, first = np.zeros(len(names), np.bool_), dict[str, int]()
         for place, name in enumerate(names):
             before = first.setdefault(name, place)
