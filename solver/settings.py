@@ -196,7 +196,7 @@ def first_resolution(settings: SolverSettings) -> Resolution:
 def allowed(resolution: Resolution, settings: SolverSettings) -> Resolution:
     """A resolution with its harmonics or samples replaced where the settings fix them."""
     fixed = first_resolution(settings)
-    return Resolution(
-        resolution.orders if settings.harmonics == "auto" else fixed.orders,
-        resolution.samples if settings.samples == "auto" else fixed.samples,
-    )
+    orders = resolution.orders if settings.harmonics == "auto" else fixed.orders
+    # given harmonics may be too many for its samples
+    enough = settings.samples == "auto" and resolution.samples > 2 * orders[-1]
+    return Resolution(orders, resolution.samples if enough else fixed.samples)

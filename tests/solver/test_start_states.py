@@ -16,11 +16,11 @@ from solver.harmonic_balance.state import State, balance_after
 from solver.loading_history import path as path_module
 from solver.loading_history import sweep as sweep_module
 from solver.loading_history.path import LoadingPath
-from solver.loading_history.start_states import FIRST_ITERATIONS
+from solver.loading_history.start_states import FIRST_ITERATIONS, OTHER_START
 from solver.newton.run import Run, guarded
 from solver.outcome import Outcome
 from solver.packing import Packed
-from solver.settings import Resolution, SolverSettings, all_orders
+from solver.settings import Resolution, SolverSettings, all_orders, allowed
 from solver.structure.condensation import condense
 from tests.benchmarks.frame import measure
 from tests.benchmarks.values import SCAR
@@ -295,3 +295,12 @@ def test_a_state_to_which_no_sweep_leads_has_an_unknown_error(monkeypatch):
     start = starts([212.5])[212.5]
     assert start.state is not None
     assert (start.outcome, start.wear_rate_error, start.reference) == (Outcome.INACCURATE, np.inf, None)
+
+
+@pytest.mark.parametrize("harmonics", ["auto", 1, 31, 32, 40])
+@pytest.mark.parametrize("samples", ["auto", 128])
+def test_another_first_state_has_samples_for_its_harmonics(harmonics, samples):
+    """With 32 given harmonics or more the 64 samples of the other start would not do: an error took its place."""
+    found = allowed(OTHER_START, SolverSettings(harmonics, samples))
+    assert found.samples > 2 * found.highest
+    assert samples == "auto" or found.samples == samples
