@@ -177,9 +177,8 @@ def draw(cases: list[Case]) -> None:
         panel.axvline(0.0, color="0.3", linewidth=1.0)
         panel.set_yticks(range(len(cases)), [case.name.rsplit(",", 1)[0] for case in cases], fontsize=7)
         panel.invert_yaxis()
-        panel.set_xlabel(
-            "computed less reference (% of the reference), bars: twice the uncertainty; hollow: not passed"
-        )
+        panel.margins(y=0.01)
+        panel.set_xlabel("E (% of the reference); hollow: not passed")
         figure.savefig(PICTURE, dpi=130)
 
 
