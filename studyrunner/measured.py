@@ -21,21 +21,26 @@ Over = Literal["cycle", "x", "frequency", "modal_amplitude"]
 
 
 class _Quantity(NamedTuple):
-    """A measured quantity. units: of its values. over: what it may be given over. column: as its column is named."""
+    """A measured quantity. units: of its values. over: what it may be given over. variables: of the result, that it is
+    compared with. column: as its column is named, by default as its key.
+    """
 
     units: str
     over: tuple[Over, ...]
+    variables: tuple[str, ...]
     column: str = ""
 
 
 QUANTITIES = {
-    "profile": _Quantity("m", ("x",), "depth"),
-    "worn_volume": _Quantity("m3", ("cycle",)),
-    "wear_depth": _Quantity("m", ("cycle",)),
-    "response_amplitude": _Quantity("m", ("cycle", "frequency")),
-    "excitation_frequency": _Quantity("Hz", ("cycle",)),
-    "natural_frequency": _Quantity("Hz", ("cycle", "modal_amplitude")),
-    "damping_ratio": _Quantity("1", ("cycle", "modal_amplitude")),
+    "profile": _Quantity("m", ("x",), ("wear_depth", "wear_depth_error"), "depth"),
+    "worn_volume": _Quantity("m3", ("cycle",), ("worn_volume", "worn_volume_error")),
+    "wear_depth": _Quantity("m", ("cycle",), ("wear_depth_max", "wear_depth_max_error")),
+    "response_amplitude": _Quantity("m", ("cycle", "frequency"), ("response_amplitude", "response_error")),
+    "excitation_frequency": _Quantity("Hz", ("cycle",), ("excitation_frequency", "excitation_frequency_error")),
+    "natural_frequency": _Quantity(
+        "Hz", ("cycle", "modal_amplitude"), ("natural_frequency", "natural_frequency_error")
+    ),
+    "damping_ratio": _Quantity("1", ("cycle", "modal_amplitude"), ("damping_ratio", "damping_ratio_error")),
 }
 """What may be measured, by its key; of `profile` the depth over the place x."""
 

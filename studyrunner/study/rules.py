@@ -6,6 +6,7 @@ from typing import Any, cast, get_args
 
 from solver.settings import FIRST_HARMONICS
 from studyrunner.kinds.table import KINDS
+from studyrunner.measured import QUANTITIES
 from studyrunner.scatter import LIVES, OF_PAIRS
 from studyrunner.study.mistakes import nearest_name
 from studyrunner.study.sections import ALLOWABLE, AUTO, DEFAULT
@@ -19,7 +20,7 @@ def broken_rules(study: Study, first: bool) -> Iterator[Wrong]:
     """All that does not fit together. study: with its axes, without variants, and before it is complete. first: whether
     it is the first of the variants, which have the same axes.
     """
-    of_all = (_keys, study.kind.broken_rules, _frequency, _amplitude) if first else ()
+    of_all = (_keys, study.kind.broken_rules, _frequency, _amplitude, _measured) if first else ()
     for rule in (*of_all, _outputs, _solver_and_end, _scatter, _evolution):
         yield from rule(study)
 
@@ -72,6 +73,19 @@ def _amplitude(study: Study) -> Iterator[Wrong]:
         yield Wrong("axes.wear_coefficient", 0.0, f"give numbers above 0: with 0 every excitation is {ALLOWABLE}")
     if study.scatter is not None and "excitation_amplitude" in study.scatter.inputs:
         yield Wrong("scatter.excitation_amplitude", None, "leave it out: the amplitude of each sample is sought")
+
+
+def _measured(study: Study) -> Iterator[Wrong]:
+    """What was measured is computed, and as long as it was measured."""
+    for name, each in study.measured.all if study.measured else ():
+        variable, key = QUANTITIES[name].variables[0], f"measured.{name}"
+        if variable not in study.kind.asked:
+            yield Wrong(key, None, f"leave it out: studies of {study.kind.words} do not compute it")
+        elif study.kind.counted:
+            last = max(each.at) if each.over == "cycle" else each.cycle or 0.0
+            if last > study.output_counts[-1] and not study.to_the_end:
+                remedy = f"raise slow_time.{study.kind.counted}s: the study ends at {study.output_counts[-1]:g}"
+                yield Wrong(f"{key}.{'at' if each.over == 'cycle' else 'cycle'}", last, remedy)
 
 
 def _outputs(study: Study) -> Iterator[Wrong]:

@@ -15,7 +15,7 @@ from studies.hdf5 import is_hdf5
 from studyrunner.coordinates import COORDINATES, SCENE
 from studyrunner.kinds.table import KINDS
 from studyrunner.kinds.wear.kind import FOLLOWED_FREQUENCY, OF_EVOLUTION
-from studyrunner.measured import read_measured
+from studyrunner.measured import QUANTITIES, read_measured
 from studyrunner.scatter import flat_table
 from studyrunner.study import scene_axes, sections
 from studyrunner.study.design import Design, read_archived_design, read_design
@@ -201,6 +201,8 @@ def _complete(study: Study) -> Study:
         names |= {"friction_power"} & {*kind.asked} if study.wear.law == "power" else set()
         names |= {*OF_EVOLUTION} & {*kind.asked} if study.evolving else set()
         names |= {"mesh"} & {*study.scene.source.offers}
+    measured = [name for name, _ in study.measured.all] if study.measured else []
+    names |= {each for name in measured for each in QUANTITIES[name].variables} & {*kind.asked}
     if study.scatter is not None and study.scatter.given_limits:
         names |= {"worn_volume", "worn_volume_error", "wear_depth_max", "wear_depth_max_error"}
         names |= {"response_amplitude", "response_error"}

@@ -203,6 +203,28 @@ def test_a_wrong_file_gets_one_line(tmp_path, text, key, words):
     assert str(error.value).count("\n") == 0
 
 
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"worn_volume": {"at": [1e9], "value": [1e-9], "standard_deviation": 1e-10}}, "raise slow_time.cycles"),
+        ({"damping_ratio": {"at": [0.0], "value": [1e-3], "standard_deviation": 1e-4}}, "do not compute it"),
+        ({"worn_volume": {"over": "x", "at": [1e-3], "value": [1e-9], "standard_deviation": 1e-10}}, "give cycle"),
+        ({"worn_volumes": {}}, "give worn_volume"),
+    ],
+)
+def test_what_the_study_does_not_compute_is_refused_before_it_runs(given, words):
+    with pytest.raises(UserError, match=words):
+        read_study("sdof_slider", {f"measured.{name}": each for name, each in given.items()})
+
+
+def test_what_was_measured_is_among_the_variables():
+    at = np.linspace(-1e-4, 1e-4, 5).tolist()
+    profile = {"over": "x", "at": at, "value": [1e-6] * 5, "standard_deviation": 1e-7}
+    scatter = {"samples": 8, "friction_coefficient": {"normal": {"std": 0.03}}}
+    study = read_study("sdof_slider", {"measured.profile": profile, "scatter": scatter})
+    assert {"wear_depth", "wear_depth_error"} <= {*study.outputs.variables}
+
+
 def test_the_result_keeps_what_was_measured(tmp_path):
     (tmp_path / "worn.csv").write_text("cycle,worn_volume_mm3\n1e4,1.0\n", encoding="utf-8")
     given = {"measured.worn_volume": {"file": str(tmp_path / "worn.csv"), "standard_deviation": 1e-10}}
