@@ -20,6 +20,7 @@ import xarray as xr
 from studyrunner.coordinates import SAMPLE
 from studyrunner.measured import MeasuredSection, Measurement
 from studyrunner.statistics.samples import CYCLE, DRAWN, FEWEST, Array
+from studyrunner.statistics.study_statistics import scatter_of
 
 FEWEST_EFFECTIVE = 20.0
 """Effective samples below which nothing is identified: a quantile of 5 % then rests on one sample."""
@@ -172,6 +173,10 @@ def identify(
         raise ValueError("The result holds no samples of inputs: run a study with [scatter].")
     if not section.all:
         raise ValueError("Nothing was measured: give [measured] in the study, or an argument.")
+    scatter = scatter_of(dataset)
+    if scatter is not None and scatter.method == "saltelli":
+        # of a base sample two rows are independent
+        dataset = dataset.isel({SAMPLE: np.arange(dataset.sizes[SAMPLE]) % scatter.rows_a_sample < 2})
     drawn = {name: dataset[f"{DRAWN}{name}"].values.astype(float) for name in inputs}
     computed = compute_measured(dataset, section)
     levels, log_likelihood, misfit = _weigh(study, drawn, computed, section.discrepancy)

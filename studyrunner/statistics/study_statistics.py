@@ -180,7 +180,7 @@ def _study_of(dataset: xr.Dataset) -> dict[str, Any]:
         return {}
 
 
-def _scatter_of(dataset: xr.Dataset) -> ScatterSection | None:
+def scatter_of(dataset: xr.Dataset) -> ScatterSection | None:
     """[scatter] of the study of a result; None where there is none that fits the samples of the file."""
     try:
         section = ScatterSection.model_validate(_study_of(dataset).get("scatter"))
@@ -191,11 +191,11 @@ def _scatter_of(dataset: xr.Dataset) -> ScatterSection | None:
 
 
 def _come_to(dataset: xr.Dataset) -> tuple[ScatterSection | None, NDArray[np.intp]]:
-    """[scatter], as `_scatter_of`, and numbers of the samples that the run has come to at all points.
+    """[scatter], as `scatter_of`, and numbers of the samples that the run has come to at all points.
 
     Of a Saltelli design whole base samples.
     """
-    left, section = _ended(dataset, "not_computed"), _scatter_of(dataset)
+    left, section = _ended(dataset, "not_computed"), scatter_of(dataset)
     left = left.any([name for name in left.dims if name != SAMPLE])
     base = 1 if section is None else section.rows_a_sample
     return section, np.flatnonzero(~left.values.reshape(-1, base).any(axis=1).repeat(base))

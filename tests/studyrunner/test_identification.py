@@ -9,8 +9,15 @@ from scipy.stats import norm, qmc
 
 from studyrunner import read_study
 from studyrunner.measured import MeasuredSection, read_columns
+from studyrunner.report.contents import draw_report
+from studyrunner.report.drawing import Drawing
+from studyrunner.result.opening import as_history
+from studyrunner.result.view import Result
 from studyrunner.statistics.identification import TooFewSamplesError, identify, weighted_quantiles
+from studyrunner.summary.answer import summary
 from studyrunner.user_error import UserError
+from tests.studyrunner.fakes import FACTS
+from tests.studyrunner.results import result_of_study
 
 COUNTS = np.linspace(0.0, 1e5, 51)
 MEAN, STD = 2e-14, 4e-15  # prior of the wear coefficient, 1/Pa
@@ -117,6 +124,22 @@ def test_too_few_samples_are_refused_with_the_range_of_the_next_round():
         identify(found_in, measured)
 
 
+def test_of_a_saltelli_design_the_independent_rows_count():
+    found_in, _ = twin()
+    text = (
+        '[scatter]\nsamples = 32\nmethod = "saltelli"\nwear_coefficient = {normal = {std = 1e-15}}\n'
+        "friction_coefficient = {normal = {std = 0.05}}"
+    )
+    at = np.array([5e4])
+    value = curved(np.array([MEAN]), np.array([0.5]), at)[0]
+    measured = measure(worn_volume={"at": at, "value": value, "standard_deviation": 1e-13})
+    found = identify(found_in.assign_attrs(study=text), measured)
+    kept = np.arange(128)[np.arange(128) % 4 < 2]
+    np.testing.assert_array_equal(found.sample, kept)
+    alone = identify(found_in.isel(sample=kept), measured)
+    assert found.posterior_quantile.values == pytest.approx(alone.posterior_quantile.values)
+
+
 def test_what_the_result_does_not_hold_is_said():
     found_in, _ = twin()
     for given, words in (
@@ -159,6 +182,47 @@ def test_a_profile_is_compared_along_x():
     found = identify(found_in, measure(profile={"over": "x", "at": at, "value": value, "standard_deviation": 1e-6}))
     assert found.posterior_quantile.values[0, 1] == pytest.approx(1.1e-5, rel=0.03)
     assert "posterior_volume" not in found
+
+
+# --- the end of a run, and the page ---
+
+
+def made(**given):
+    """A result of a slider that wears in proportion to the cycles, 1 mm3 in the end; samples scatter by a tenth."""
+    value = {"at": [1e4, 2e4], "value": [0.5e-9, 1.1e-9], "standard_deviation": 5e-11}
+    study = read_study("sdof_slider", {"axes.scheme": "adaptive", "measured.worn_volume": value, **given})
+    share = 1e-9 * np.linspace(0.0, 1.0, len(study.output_counts))
+    if study.scatter is None:
+        return result_of_study(study, FACTS, worn_volume=lambda _: share)
+    size, place = 1.0 + 0.1 * norm.ppf((np.arange(64) + 0.5) / 64), list(study.dimensions).index("sample")
+    found = result_of_study(study, FACTS, worn_volume=lambda p: size[p[place]] * share)
+    return found.assign_coords(sample_friction_coefficient=("sample", 0.5 * size, {"units": "1"}))
+
+
+def test_the_end_of_a_run_says_how_far_computed_values_are_off():
+    found = summary(made()).values["measured"]
+    np.testing.assert_allclose(found["computed"], [0.5e-9, 1e-9])
+    (text,) = [text for label, text in summary(made()).rows if label == "measured"]
+    assert "E = -9.09 % at cycle 20000, 2 times its standard uncertainty" in text
+    assert "the largest of 2" in text
+
+
+def test_the_end_of_a_run_says_what_was_identified_or_why_nothing_was():
+    scatter = {"samples": 64, "friction_coefficient": {"normal": {"std": 0.05}}}
+    text = dict(summary(made(scatter=scatter)).rows)["identified"]
+    assert "friction coefficient 0." in text
+    assert "effective samples" in text
+    precise = {"at": [2e4], "value": [1.1e-9], "standard_deviation": 1e-13}
+    text = dict(summary(made(scatter=scatter, **{"measured.worn_volume": precise})).rows)["identified"]
+    assert "draw more, or next from friction_coefficient = {uniform" in text
+
+
+@pytest.mark.parametrize("scatter", [None, {"samples": 64, "friction_coefficient": {"normal": {"std": 0.05}}}])
+def test_the_page_shows_both(scatter):
+    shown = Result("made.nc", as_history(made(**({"scatter": scatter} if scatter else {})))[0])
+    names = [item.name for item in draw_report(shown) if isinstance(item, Drawing)]
+    assert "measured" in names
+    assert ("identified" in names) == (scatter is not None)
 
 
 # --- files ---
