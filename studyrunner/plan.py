@@ -189,6 +189,13 @@ def doubts_of_study(study: Study, facts: SceneFacts | None = None) -> tuple[str,
             "scene.worn has dissipated energies, with which friction and stiffness change by [wear.evolution], and this"
             " study has none: is that meant, or is the [wear.evolution] of the wear study to be repeated?"
         )
+    found += _about_frequencies(own, stuck)
+    return tuple(filter(None, found))
+
+
+def _about_frequencies(own: Sequence[float], stuck: float) -> list[str]:
+    """Questions for frequencies, Hz, far from the first resonance with the joint stuck, 0 where it is not known."""
+    found = list[str]()
     low, high = (end(own, default=0.0) / (2.0 * math.pi) for end in (min, max))
     if stuck / math.pi < low < 2.0 * stuck and 0.5 * stuck < high:
         found.append(f"frequencies are all far above the first resonance, {stuck:.5g} Hz: are they in rad/s?")
@@ -196,7 +203,7 @@ def doubts_of_study(study: Study, facts: SceneFacts | None = None) -> tuple[str,
         nearest = min(own, key=lambda frequency: abs(math.log(frequency / stuck)))
         near = ("Hz", stuck / _FAR, stuck * _FAR, {"kHz": 1e3, "mHz": 1e-3})
         found.append(_question("frequency", [nearest], near, f"far from the first resonance, near {stuck:.4g} Hz"))
-    return tuple(filter(None, found))
+    return found
 
 
 def _question(

@@ -19,8 +19,8 @@ import xarray as xr
 
 from studyrunner.coordinates import SAMPLE
 from studyrunner.measured import MeasuredSection, Measurement
+from studyrunner.statistics.read_samples import scatter_of
 from studyrunner.statistics.samples import CYCLE, DRAWN, FEWEST, Array
-from studyrunner.statistics.study_statistics import scatter_of
 
 FEWEST_EFFECTIVE = 20.0
 """Effective samples below which nothing is identified: a quantile of 5 % then rests on one sample."""

@@ -7,8 +7,9 @@ import xarray as xr
 
 from studyrunner.scatter import ScatterSection
 from studyrunner.statistics import samples
+from studyrunner.statistics.read_samples import LIFE
 from studyrunner.statistics.samples import FEWEST
-from studyrunner.statistics.study_statistics import CONFIDENCE, LIFE, QUANTILES, QUANTITIES
+from studyrunner.statistics.study_statistics import CONFIDENCE, QUANTILES, QUANTITIES
 from studyrunner.system.progress import count
 from studyrunner.units import show_number, show_percent
 

@@ -1,19 +1,25 @@
 """The statistics of a result with samples, as a labelled dataset."""
 
-import tomllib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from studyrunner.coordinates import SAMPLE
-from studyrunner.scatter import ScatterSection
 from studyrunner.statistics import samples
+from studyrunner.statistics.read_samples import (
+    LIFE,
+    RESPONSE,
+    come_to,
+    in_cycles_of,
+    read_samples,
+    study_of,
+    with_responses,
+)
 from studyrunner.statistics.samples import CYCLE, DRAWN, Array, SampleValues
-from studyrunner.variables import in_metres
 
 QUANTILES = (0.05, 0.25, 0.5, 0.75, 0.95)  # of the bands that figures show
 CONFIDENCE = 0.95
@@ -41,8 +47,6 @@ class _Quantity(NamedTuple):
     at_least: bool = False
 
 
-LIFE = "cycles_to_target"
-RESPONSE = "response_amplitude"
 QUANTITIES = {
     "worn_volume": _Quantity("worn volume", "m3", ("worn_volume",), "exceeded_volume", 1e9, "mm3"),
     "wear_depth": _Quantity(
@@ -105,13 +109,13 @@ def worn_volume_statistics(
     for slow in map(str, {*dataset["worn_volume"].dims} - {*dataset["outcome"].dims, CYCLE}):
         # in place of cycles, as missions
         in_cycles = limits and {name.replace(f"{slow}s_", "cycles_"): each for name, each in limits.items()}
-        counted = worn_volume_statistics(_in_cycles(dataset), quantiles, confidence, exceed, depth, in_cycles)
+        counted = worn_volume_statistics(in_cycles_of(dataset), quantiles, confidence, exceed, depth, in_cycles)
         of_lives = [name for name in map(str, counted.data_vars) if name.startswith(LIFE)]
         return counted.rename({CYCLE: slow, **{name: name.replace("cycles_", f"{slow}s_") for name in of_lives}})
     if "cycle_count" in dataset:
         # each point has counts of its own: they share the last one only
         dataset = dataset.isel({CYCLE: [-1]})
-    (section, there), n_rows = _come_to(dataset), dataset.sizes[SAMPLE]
+    (section, there), n_rows = come_to(dataset), dataset.sizes[SAMPLE]
     if not there.size:
         raise ValueError("No sample of the result is computed yet.")
     is_saltelli = section is not None and section.method == "saltelli"
@@ -119,7 +123,7 @@ def worn_volume_statistics(
     if section is not None and is_saltelli:
         # A and B are independent samples
         rows = rows[rows % section.rows_a_sample < 2]
-    own = everything, names = _read_samples(dataset, "worn_volume")
+    own = everything, names = read_samples(dataset, "worn_volume")
     values = everything.at((..., rows))
     given = {} if limits is None else limits
     if limits is None and section is not None:
@@ -139,15 +143,15 @@ def worn_volume_statistics(
     coords["quantile"] = ("quantile", np.asarray(quantiles), _about("1", "probability"))
     for name in QUANTITIES:
         variable = _variable_of(dataset, name)
-        has_lives = name == LIFE and bool(_study_of(dataset).get("slow_time", {}).get("until"))
+        has_lives = name == LIFE and bool(study_of(dataset).get("slow_time", {}).get("until"))
         has_lives &= "allowable_amplitude" not in dataset
         if variable and (name in given or has_lives or name not in (RESPONSE, LIFE)):
-            whole, own_names = _read_samples(dataset, variable)
+            whole, own_names = read_samples(dataset, variable)
             of_values, of_coords = _of_values(name, whole.at((..., rows)), own_names, asked)
             found, coords = found | of_values, coords | of_coords
     order = sorted(str(name).removeprefix(DRAWN) for name in dataset.coords if str(name).startswith(DRAWN))
     if inputs := [*section.inputs] if section is not None else order:
-        of, decided = ("life", _read_samples(dataset, LIFE)) if f"{LIFE}_quantile" in found else ("worn volume", own)
+        of, decided = ("life", read_samples(dataset, LIFE)) if f"{LIFE}_quantile" in found else ("worn volume", own)
         found |= _of_inputs(dataset, inputs, of, decided, confidence, is_saltelli=is_saltelli)
         coords["input"] = ("input", inputs, _about("1", "input that scatters"))
     found |= _of_groups(dataset.isel({SAMPLE: rows}), values, names)
@@ -160,9 +164,9 @@ def statistics_of_file(dataset: xr.Dataset, blocks: xr.Dataset | None = None) ->
 
     blocks: variables of blocks of missions, over cycles as those of the dataset.
     """
-    if dataset.sizes.get(SAMPLE, 0) < 2 or "worn_volume" not in dataset or _come_to(dataset)[1].size < 2:
+    if dataset.sizes.get(SAMPLE, 0) < 2 or "worn_volume" not in dataset or come_to(dataset)[1].size < 2:
         return None
-    dataset = dataset if blocks is None else _with_responses(dataset, blocks)
+    dataset = dataset if blocks is None else with_responses(dataset, blocks)
     counts = dataset.sizes[CYCLE]
     per_count = dataset["worn_volume"].size // counts
     if 2 * per_count > _MOST_OF_ALL:
@@ -170,96 +174,6 @@ def statistics_of_file(dataset: xr.Dataset, blocks: xr.Dataset | None = None) ->
     kept = min(counts, max(2, _MOST_VALUES // per_count))
     places = np.unique(np.linspace(0, counts - 1, kept).astype(int))
     return worn_volume_statistics(dataset.isel({CYCLE: places}), QUANTILES, CONFIDENCE)
-
-
-def _study_of(dataset: xr.Dataset) -> dict[str, Any]:
-    """The study of a result; empty where it has none."""
-    try:
-        return tomllib.loads(str(dataset.attrs.get("study", "")))
-    except ValueError:
-        return {}
-
-
-def scatter_of(dataset: xr.Dataset) -> ScatterSection | None:
-    """[scatter] of the study of a result; None where there is none that fits the samples of the file."""
-    try:
-        section = ScatterSection.model_validate(_study_of(dataset).get("scatter"))
-    except ValueError:
-        return None
-    has_all = all(f"{DRAWN}{name}" in dataset.coords for name in section.inputs)
-    return section if has_all and dataset.sizes[SAMPLE] % section.rows_a_sample == 0 else None
-
-
-def _come_to(dataset: xr.Dataset) -> tuple[ScatterSection | None, NDArray[np.intp]]:
-    """[scatter], as `scatter_of`, and numbers of the samples that the run has come to at all points.
-
-    Of a Saltelli design whole base samples.
-    """
-    left, section = _ended(dataset, "not_computed"), scatter_of(dataset)
-    left = left.any([name for name in left.dims if name != SAMPLE])
-    base = 1 if section is None else section.rows_a_sample
-    return section, np.flatnonzero(~left.values.reshape(-1, base).any(axis=1).repeat(base))
-
-
-def _ended(dataset: xr.Dataset, word: str) -> xr.DataArray:
-    """Points with this outcome."""
-    outcome: xr.DataArray = dataset["outcome"]
-    words = dict(zip(outcome.attrs["flag_meanings"].split(), np.atleast_1d(outcome.attrs["flag_values"]), strict=False))
-    return outcome.isin(words.get(word, -1))
-
-
-def _in_cycles(dataset: xr.Dataset) -> xr.Dataset:
-    """A result of missions as one of cycles."""
-    in_cycles = _with_responses(dataset.drop_dims("block", errors="ignore"), dataset)
-    names = {"mission": CYCLE, "missions_to_target": LIFE, "last_mission": "last_cycle"}
-    names["missions_to_target_error"] = f"{LIFE}_error"
-    return in_cycles.rename({old: new for old, new in names.items() if old in in_cycles.variables})
-
-
-def _with_responses(dataset: xr.Dataset, blocks: xr.Dataset) -> xr.Dataset:
-    """With the largest response of all blocks, and the largest error."""
-    return dataset.assign({name: blocks[name].max("block") for name in (RESPONSE, "response_error") if name in blocks})
-
-
-def _read_samples(dataset: xr.Dataset, name: str) -> tuple[SampleValues, tuple[str, ...]]:
-    """Samples of a variable of a result, and the dimensions before them: worn_volume, m3, wear_depth_max, m, or
-    wear_depth, m, of which the deepest pair counts, with the largest error of any pair; the largest
-    response_amplitude, m, up to a count; cycles_to_target.
-
-    What was not computed lies above the last value that was, without upper bound. What is `sensitive`, or known to have
-    no known error, lies within its error, which may be infinite. An error that is not in the file is infinite.
-    """
-    values = dataset[name].astype(float)
-    of_error = "response_error" if name == RESPONSE else f"{name}_error"
-    errors = dataset.get(of_error, xr.full_like(values, np.inf))
-    if "contact" in values.dims:
-        values, errors = values.max("contact"), errors.max("contact")
-    if "response" in values.dims:
-        values = values.isel(response=in_metres(values["response"].values)).max("response")
-        errors = errors.max("response") if "response" in errors.dims else errors
-    values = values.transpose(..., SAMPLE)
-    value, missing = values.values, values.isnull().values
-    sensitive = _ended(dataset, "sensitive").broadcast_like(values).transpose(*values.dims).values
-    low, high = np.where(missing, 0.0, value), np.where(missing, np.inf, value)
-    error = errors.fillna(np.inf).broadcast_like(values).transpose(*values.dims).values.copy()
-    # nothing worn is known to be nothing
-    error[missing | (value == 0.0)] = 0.0
-    if name in ("worn_volume", RESPONSE):
-        # its error is relative
-        error *= low
-    if CYCLE in values.dims:
-        # wear never falls, nor does the largest response
-        axis = values.dims.index(CYCLE)
-        largest = np.maximum.accumulate(low, axis=axis)
-        low, high = np.where(missing, largest, low), high
-        if name == RESPONSE:
-            low, high, error = largest, np.where(missing, np.inf, largest), np.maximum.accumulate(error, axis=axis)
-    if name == LIFE:
-        reached = dataset["last_cycle"].fillna(0.0).transpose(*values.dims).values
-        low = np.where(missing, np.where(sensitive, 0.0, reached), low)
-    unknown = np.isinf(error) & (of_error in dataset)
-    found = SampleValues(low, high, error).widened((sensitive | unknown) & ~missing)
-    return replace(found, low=np.maximum(found.low, 0.0)), tuple(map(str, values.dims[:-1]))
 
 
 def _about(units: str, long_name: str) -> dict[str, str]:

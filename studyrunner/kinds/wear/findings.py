@@ -15,9 +15,10 @@ from studyrunner.kinds.wear.response import describe_response
 from studyrunner.kinds.wear.sought import find_allowable
 from studyrunner.result.pairs import contact_pairs, has_depths, last_depth
 from studyrunner.result.view import NO_MOTION, NO_VOLUME, Point, Result
+from studyrunner.statistics.read_samples import LIFE
 from studyrunner.statistics.samples import DRAWN
 from studyrunner.statistics.sentences import describe_limit, describe_ranking, describe_volumes
-from studyrunner.statistics.study_statistics import LIFE, QUANTITIES
+from studyrunner.statistics.study_statistics import QUANTITIES
 from studyrunner.study.scene_section import WORN_AXIS, worn_before
 from studyrunner.summary.findings import LEAST_ERROR, Finding, show, where_is, with_error
 from studyrunner.system.progress import count

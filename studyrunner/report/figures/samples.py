@@ -11,8 +11,9 @@ from studyrunner.report import drawing as plot
 from studyrunner.report.drawing import COLOURS, Drawn, FloatArray, as_sentences
 from studyrunner.report.selection import choose, find_course, slow_time
 from studyrunner.result.view import NO_VOLUME, Result
+from studyrunner.statistics.read_samples import LIFE, RESPONSE
 from studyrunner.statistics.sentences import count_samples, describe_ranking, measure_of
-from studyrunner.statistics.study_statistics import LIFE, QUANTITIES, RESPONSE
+from studyrunner.statistics.study_statistics import QUANTITIES
 from studyrunner.system.progress import count
 from studyrunner.units import Scale, scale_for, units_of
 
