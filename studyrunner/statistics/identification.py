@@ -18,7 +18,7 @@ import numpy as np
 import xarray as xr
 
 from studyrunner.coordinates import SAMPLE
-from studyrunner.measured import MeasuredSection, Measurement
+from studyrunner.measured import QUANTITIES, MeasuredSection, Measurement
 from studyrunner.statistics.read_samples import scatter_of
 from studyrunner.statistics.samples import CYCLE, DRAWN, FEWEST, Array
 
@@ -76,10 +76,13 @@ def compute_measured(dataset: xr.Dataset, section: MeasuredSection) -> tuple[Com
 def _compute(dataset: xr.Dataset, name: str, measurement: Measurement) -> Computed:
     at, measured, deviation = measurement.numbers
     values = _variable(dataset, name, measurement)
-    of_error = f"{values.name}_error"
-    error = dataset[of_error] if of_error in dataset else xr.zeros_like(values)
-    # an error that is not known: the value says nothing
-    error = error.fillna(math.inf) * (np.abs(values) if values.name in _RELATIVE else 1.0)
+    of_error = QUANTITIES[name].variables[1] if values.name != "wear_depth" else "wear_depth_error"
+    if of_error not in dataset:
+        raise ValueError(f"measured.{name}: the result holds no {of_error}, ask for it by outputs.variables")
+    error = dataset[of_error].astype(float)
+    # an error that is not known: the value says nothing; of nothing worn it is none
+    size = np.abs(values) if values.name in _RELATIVE else xr.ones_like(values)
+    error = (error.fillna(math.inf) * size).where(size != 0.0, 0.0)
     along = {"x": "contact", "cycle": CYCLE}.get(measurement.over, measurement.over)
     wanted, arrays = [each for each in (SAMPLE, CYCLE, along) if each in values.dims], []
     for array in (values, error):

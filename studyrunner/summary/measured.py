@@ -64,6 +64,8 @@ def _compared(measurement: Measurement, computed: Computed, section: MeasuredSec
     worst = int(np.nanargmax(np.abs(off) / whole))
     size = abs(float(computed.measured[worst])) or math.nan
     where = _OVER[measurement.over].format(computed.at[worst])
+    if not np.isfinite(error[worst]):
+        return Finding("measured", "measured", f"{words}: the error of the computed value is not known", {})
     u_num, u_data = (show_percent(float(each[worst]) / size) for each in (error / math.sqrt(3.0), data))
     text = f"{words}: computed less measured E = {100.0 * off[worst] / size:+.3g} % at {where},"
     text += f" {abs(off[worst]) / whole[worst]:.2g} times its standard uncertainty (u_num {u_num}, u_D {u_data})"

@@ -33,7 +33,11 @@ def result(volume, drawn, study=""):
     coords = {f"sample_{name}": ("sample", values, {"units": "1"}) for name, values in drawn.items()}
     dims = ("scheme", "sample", "cycle")
     return xr.Dataset(
-        {"worn_volume": (dims, volume[None]), "outcome": (dims[:2], np.zeros((1, n), dtype=np.int8))},
+        {
+            "worn_volume": (dims, volume[None]),
+            "worn_volume_error": (dims, np.zeros((1, *volume.shape))),
+            "outcome": (dims[:2], np.zeros((1, n), dtype=np.int8)),
+        },
         {"cycle": COUNTS, "sample": np.arange(n), "scheme": ["adaptive"], **coords},
         {"study": study},
     )
@@ -167,13 +171,35 @@ def test_an_error_of_the_computation_widens_the_interval():
     assert widths[1] > 1.3 * widths[0]
 
 
+def test_an_error_that_is_not_known_is_not_none():
+    """Of a response, whose error has a name of its own; without any error nothing is compared."""
+    found_in, own = twin()
+    tip = xr.DataArray(1e-3 * (1.0 + own["friction_coefficient"]), dims="sample") + 0.0 * found_in["worn_volume"]
+    found_in = found_in.assign(response_amplitude=tip)
+    value = {"over": "cycle", "at": [5e4], "value": [1.5e-3], "standard_deviation": 2e-5}
+    measured = measure(response_amplitude=value)
+    with pytest.raises(ValueError, match="holds no response_error"):
+        identify(found_in, measured)
+    widths = []
+    for error in (0.0, 0.05):
+        known = found_in.assign(response_error=xr.full_like(tip, error))
+        ends = identify(known, measured).posterior_quantile.sel(input="friction_coefficient").values
+        widths.append(ends[2] - ends[0])
+    assert widths[1] > 1.5 * widths[0]
+    with pytest.raises(TooFewSamplesError, match="No sample holds"):
+        identify(found_in.assign(response_error=xr.full_like(tip, np.nan)), measured)
+
+
 def test_a_profile_is_compared_along_x():
     """Pairs on one side of a symmetric scar; two rows of pairs count as one."""
     x, n = np.array([1.0, 1.0, 2.0, 2.0, 3.0, 3.0]) * 1e-4, 256
     scale = 1e-5 * (1.0 + 0.2 * draws(n, 1)[:, 0])
     depth = scale[:, None, None] * (COUNTS[:, None] / 1e5) * (1.0 - (x / 4e-4) ** 2)
     found_in = xr.Dataset(
-        {"wear_depth": (("sample", "cycle", "contact"), depth)},
+        {
+            "wear_depth": (("sample", "cycle", "contact"), depth),
+            "wear_depth_error": (("sample", "cycle", "contact"), 0.0 * depth),
+        },
         {"cycle": COUNTS, "contact_x": ("contact", x), "sample_depth": ("sample", scale, {"units": "m"})},
         {"contact_mirrored": "x"},
     )
