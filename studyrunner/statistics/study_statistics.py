@@ -9,6 +9,7 @@ import xarray as xr
 from numpy.typing import ArrayLike
 
 from studyrunner.coordinates import SAMPLE
+from studyrunner.scatter import ScatterSection
 from studyrunner.statistics import samples
 from studyrunner.statistics.read_samples import (
     LIFE,
@@ -125,12 +126,7 @@ def worn_volume_statistics(
         rows = rows[rows % section.rows_a_sample < 2]
     own = everything, names = read_samples(dataset, "worn_volume")
     values = everything.at((..., rows))
-    given = {} if limits is None else limits
-    if limits is None and section is not None:
-        own_limits = {name.replace("missions_", "cycles_"): limit for name, limit in section.given_limits.items()}
-        given = {name: limit for name, limit in own_limits.items() if _variable_of(dataset, name)}
-    if wrong := [name for name, limit in given.items() if not (_variable_of(dataset, name) and limit > 0.0)]:
-        raise ValueError(f"Give limits above 0 of what the file has, not {wrong[0]} = {given[wrong[0]]}.")
+    given = _limits_of(dataset, section, limits)
     asked = _Asked(quantiles, confidence, {"worn_volume": exceed, "wear_depth": depth}, given)
     about_missing = _about("1", "samples without a value to be trusted")
     n_left, about_left = n_rows * len(rows) // there.size - len(rows), _about("1", "samples that are not computed yet")
@@ -157,6 +153,19 @@ def worn_volume_statistics(
     found |= _of_groups(dataset.isel({SAMPLE: rows}), values, names)
     kept = {name: array for name, array in dataset.coords.items() if set(array.dims) <= set(names)}
     return xr.Dataset(found, kept | coords, {"title": f"Statistics of {len(rows)} samples", "confidence": confidence})
+
+
+def _limits_of(
+    dataset: xr.Dataset, section: ScatterSection | None, limits: Mapping[str, float] | None
+) -> Mapping[str, float]:
+    """Limits that are asked for, else those of the study. Raises ValueError where one is of what the file lacks."""
+    given = {} if limits is None else limits
+    if limits is None and section is not None:
+        own = {name.replace("missions_", "cycles_"): limit for name, limit in section.given_limits.items()}
+        given = {name: limit for name, limit in own.items() if _variable_of(dataset, name)}
+    if wrong := [name for name, limit in given.items() if not (_variable_of(dataset, name) and limit > 0.0)]:
+        raise ValueError(f"Give limits above 0 of what the file has, not {wrong[0]} = {given[wrong[0]]}.")
+    return given
 
 
 def statistics_of_file(dataset: xr.Dataset, blocks: xr.Dataset | None = None) -> xr.Dataset | None:
