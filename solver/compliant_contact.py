@@ -150,4 +150,5 @@ def _softened(linear: LinearModel, relative: IntArray, scale: FloatArray, spring
     own = np.arange(n, len(places))
     stiffness[own, own] += springs
     load_static, load_harmonic = linear.load_static[places] * factor, linear.load_harmonic[places] * factor
-    return LinearModel(mass, damping, stiffness, load_static, load_harmonic, linear.response[:, places] * factor)
+    blade = None if linear.blade is None else linear.blade[:, places] * factor
+    return LinearModel(mass, damping, stiffness, load_static, load_harmonic, linear.response[:, places] * factor, blade)

@@ -232,6 +232,8 @@ class LinearModel(_ByRows):
     - load_static (n,): N, real.
     - load_harmonic (n,): N per unit excitation amplitude; complex, load(t) = Re(F exp(i w t)).
     - response (n_response, n): matrix from the displacements to the reported responses, m.
+    - blade (m, n): of a sector, whose blade may deviate in a ring (`solver.structure.ring`): amplitudes of the modes of
+      the blade alone, sqrt(N m), of which `blade^H blade` is the stiffness. None where they are not known.
     """
 
     mass: Matrix
@@ -240,12 +242,14 @@ class LinearModel(_ByRows):
     load_static: FloatArray
     load_harmonic: ComplexArray
     response: Matrix
+    blade: Matrix | None = None
 
     @cached_property
     def conjugate(self) -> "LinearModel":
         """The structure of a harmonic whose nodal diameter is folded back: conjugate matrices, so damping is kept."""
         parts = (self.mass, self.damping, self.stiffness, self.load_static, self.load_harmonic, self.response)
-        return LinearModel(*(np.conj(part) for part in parts))
+        one = LinearModel(*(np.conj(part) for part in parts))
+        return one if self.blade is None else replace(one, blade=np.conj(self.blade))
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -27,7 +27,7 @@ from scipy.linalg import eigh
 
 from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel
 from solver.settings import Scheme
-from solver.structure.condensation import condense
+from solver.structure.schur import condense
 
 SALT = 1931  # Den Hartog's year: other seeds of the tests have nothing to do with these
 COMPONENTS = {

@@ -25,10 +25,11 @@ from solver.model import ComplexArray, FloatArray, Matrix
 from solver.newton.run import SHORTEST_STEP, Run
 from solver.outcome import Outcome
 from solver.settings import ROUND_OFF
-from solver.structure.condensation import condense, whole_motion
+from solver.structure.condensation import whole_motion
 from solver.structure.fourier import from_complex, with_static
 from solver.structure.harmonic_stiffness import DenseStiffness
 from solver.structure.joint import Joint, held
+from solver.structure.schur import condense
 
 TRANSIENT_CUT = 0.35
 """Factor of the length of a refused step. Half the value takes 2.5 times the iterations of a jump at a fold; with 0.25

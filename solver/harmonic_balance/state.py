@@ -11,9 +11,10 @@ from solver.model import ComplexArray, FloatArray
 from solver.outcome import Ended, Outcome
 from solver.packing import packable
 from solver.settings import FINE_SAMPLES, SAMPLES_PER_HARMONIC, Resolution
-from solver.structure.condensation import CACHED_STRUCTURES, SingularStructureError, build_structure
+from solver.structure.condensation import CACHED_STRUCTURES, build_structure
 from solver.structure.fourier import build_basis, change_orders, from_complex, synthesis, to_complex
 from solver.structure.joint import Case, Hold, Joint
+from solver.structure.schur import SingularStructureError
 
 
 @packable

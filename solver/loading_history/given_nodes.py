@@ -15,7 +15,7 @@ from solver.results.history import StartState
 from solver.results.state_report import evaluated, periodic_state
 from solver.settings import Resolution
 from solver.stability.floquet import find_instability
-from solver.structure.condensation import SingularStructureError
+from solver.structure.schur import SingularStructureError
 
 LAST_NODES = 3
 """Last nodes of a sweep: the next one is predicted on the parabola through them. With a straight line the nodes of the

@@ -19,7 +19,7 @@ import scipy.linalg
 from solver.compliant_contact import stiffened
 from solver.model import BoolArray, LinearModel, Matrix, ReducedModel
 from solver.settings import NEGLIGIBLE
-from solver.structure.condensation import regular
+from solver.structure.schur import regular
 
 
 @dataclass(frozen=True)

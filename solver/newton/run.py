@@ -17,9 +17,9 @@ from solver.model import FloatArray
 from solver.newton.linear_solver import FORCING, JacobianSolver
 from solver.outcome import Outcome, describe_error, is_machine_fault
 from solver.settings import Resolution
-from solver.structure.condensation import SingularStructureError
 from solver.structure.fourier import build_basis
 from solver.structure.joint import Case, Joint
+from solver.structure.schur import SingularStructureError
 
 MOST_ITERATIONS = 30
 """Most iterations of one solve: 2 to 5 are needed from a near state. With 20 and 60 slider, blocks, waves and impacts

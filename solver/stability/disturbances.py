@@ -30,6 +30,7 @@ from solver.model import BoolArray, ComplexArray, FloatArray, IntArray, LinearMo
 from solver.settings import FEWEST_SAMPLES
 from solver.structure.fourier import build_basis, derivative
 from solver.structure.joint import Joint
+from solver.structure.ring import RingModel
 
 SMALL_SAMPLES = 512
 """Samples of the law in a period of a small joint: 72 scenes with one pair lie on the right side of 1, most within
@@ -129,7 +130,9 @@ def build_monodromy(joint: Joint, at: Evaluation, n_samples: int, n_sectors: int
 
     Raises numpy.linalg.LinAlgError where the structure is singular.
     """
-    steps = -(-n_samples // n_sectors)
+    ring = joint.model if isinstance(joint.model, RingModel) else None
+    apart = ring.phase_steps if ring else 1
+    steps = -(-n_samples // (n_sectors * apart)) * apart
     fine = replace(joint, basis=build_basis(joint.basis.orders, steps * n_sectors))
     state = Balance(fine, at.start_history, at.wear_depth, energy=at.energy).evaluate(at.predicted_h)
     switching, stuck = switching_pairs(state)
@@ -142,13 +145,13 @@ def build_monodromy(joint: Joint, at: Evaluation, n_samples: int, n_sectors: int
     place = np.where(dofs[switching] >= 0, first + (np.cumsum(moves) - 1)[dofs[switching]], -1).reshape(-1, 1, 3)
     there, rows = place.ravel() >= 0, place.ravel()
     spread = np.where(there, compliance[rows].T, 0.0)
+    sampled = list(vars(fine.law.sampled(state, np.flatnonzero(switching))).values())
+    if ring:
+        # the structure of a ring is taken at one time, at which each of its sectors has another phase
+        at_phase = np.arange(steps)[:, None] + ring.phase_of_pairs[switching] * (steps // apart)
+        sampled = [part[at_phase % steps, np.arange(part.shape[1])] for part in sampled]
     # each sector goes through its own part of the period
-    law = SampledLaw(
-        *(
-            np.hstack(part.reshape(n_sectors, steps, *part.shape[1:]))
-            for part in vars(fine.law.sampled(state, np.flatnonzero(switching))).values()
-        )
-    )
+    law = SampledLaw(*(np.hstack(part.reshape(n_sectors, steps, *part.shape[1:])) for part in sampled))
     # of displacements and velocities, now and before, and of the inner states
     rows_of_sectors = (
         np.arange(4 * n).reshape(4, n_sectors, -1),

@@ -47,6 +47,7 @@ from solver.stability.disturbances import (
     switching_pairs,
 )
 from solver.structure.joint import Case, Joint
+from solver.structure.ring import RingModel
 
 OPENING_HARMONICS = 19
 """Fewest harmonics for a small joint that opens and closes: with 9 the multiplier is 0.95 in place of 2.8.
@@ -146,7 +147,7 @@ def find_multipliers(case: Case, state: State, run: Run, *, growing_only: bool =
     sharp = _sharper(case, state, run)
     if sharp is None:
         return Multipliers(nothing, np.inf, f"no vibration with {OPENING_HARMONICS} harmonics is found near")
-    if n_sectors == 1 and not joint.law.rate_dependent and (values := hill_multipliers(*sharp)).size:
+    if not joint.model.nodal_diameter and not joint.law.rate_dependent and (values := hill_multipliers(*sharp)).size:
         return Multipliers(_sorted(values), 0.0)
     return _integrated(*sharp, case.settings.rtol, growing_only)
 
@@ -157,9 +158,9 @@ def _moving(joint: Joint, at: Evaluation) -> int:
 
 
 def _sectors(joint: Joint, at: Evaluation) -> int:
-    """Sectors of a travelling wave in which disturbances are integrated; 1 for other structures."""
+    """Sectors of a travelling wave in which disturbances are integrated; 1 for other structures, as that of a ring."""
     model = joint.model
-    if not model.nodal_diameter:
+    if not model.nodal_diameter or isinstance(model, RingModel):
         return 1
     apart = model.n_sectors // math.gcd(model.n_sectors, model.nodal_diameter)
     most = min(max(SMALL_JOINT // max(_moving(joint, at), 1), 3), 2 * joint.basis.orders[-1] + 1)

@@ -6,11 +6,10 @@ into those of the pairs (r) and all others (i),
     Z_r = A_rr - A_ri A_ii^-1 A_ir,      F_r = f_r - A_ri A_ii^-1 f_i.                                         (8)
 """
 
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, NamedTuple, cast
+from typing import cast
 
 import numpy as np
 from scipy.linalg.lapack import zgetrf, zgetrs
@@ -18,6 +17,9 @@ from scipy.linalg.lapack import zgetrf, zgetrs
 from solver.model import ComplexArray, FloatArray, IntArray, LinearModel, Matrix, ReducedModel
 from solver.structure.fourier import from_complex, to_complex
 from solver.structure.harmonic_stiffness import DenseStiffness, SharedStiffness
+from solver.structure.ring import RingStructure
+from solver.structure.ring_stiffness import RingStiffness, condense_ring
+from solver.structure.schur import condense, dynamic_stiffness, regular
 
 DENSE_BYTES = 2e6
 """Bytes of the matrices of all harmonics up to which a product with each matrix is fastest. Half and twice: dovetail,
@@ -25,12 +27,6 @@ waves and blocks are equal."""
 
 CACHED_STRUCTURES = 8
 """Condensed structures in the cache. A wear history with its errors uses six."""
-
-
-def _dynamic_stiffness(linear: LinearModel, exponent: complex | ComplexArray, at: Any) -> ComplexArray:
-    """Entries `at` of `K + s C + s^2 M`, N/m, for motions exp(s t); exponent: s, 1/s."""
-    stiffness = linear.stiffness[at] + exponent * linear.damping[at] + exponent**2 * linear.mass[at]
-    return cast("ComplexArray", stiffness)
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +43,7 @@ class CondensedStructure:
     """
 
     static_stiffness: FloatArray
-    moving: DenseStiffness | SharedStiffness
+    moving: DenseStiffness | SharedStiffness | RingStiffness
     force_h: FloatArray
     static_response: FloatArray
     dynamic_response: ComplexArray
@@ -92,19 +88,6 @@ class CondensedStructure:
         return float(-np.pi * np.imag(self.drive @ to_complex(displacement_h)[:, 0] + self.drive_offset))
 
 
-class SingularStructureError(np.linalg.LinAlgError):
-    """The structure with a stuck joint is singular; no other failure of linear algebra is called so."""
-
-
-@contextmanager
-def regular(where: str) -> Iterator[None]:
-    """Says that it is the structure that is singular in what follows; where: at which frequency."""
-    try:
-        yield
-    except np.linalg.LinAlgError as error:
-        raise SingularStructureError(f"the matrix of the structure is singular {where}") from error
-
-
 def build_structure(
     model: ReducedModel, omega: float, excitation_amplitude: float, orders: tuple[int, ...]
 ) -> CondensedStructure:
@@ -127,6 +110,10 @@ def _condensed(
 ) -> CondensedStructure:
     """As `build_structure`, from the structure of each harmonic, the static one included."""
     still, first, at = structures[0], structures[min(1, len(orders))], np.array(relative, np.intp)
+    if isinstance(still, RingStructure):
+        rings = cast("tuple[RingStructure, ...]", structures)
+        with regular(f"at {omega / (2.0 * np.pi):.6g} Hz, at one of its harmonics, or at rest"):
+            return CondensedStructure(**condense_ring(rings, at, omega, excitation_amplitude, orders))
     n_rel, parts = at.size, (still.mass, still.damping, still.stiffness, still.response)
     alike = all(each is still for each in structures) and not any(np.iscomplexobj(part) for part in parts)
     # not where much lies behind the joint: a `SharedStiffness` has to read that, too
@@ -184,7 +171,7 @@ def _condense_each(
         loads = np.where(np.array(orders)[places, None] == 1, load, 0.0)
         responses = np.broadcast_to(linear.response, (len(places), *linear.response.shape))
         seen = np.concatenate([responses, loads.conj()[:, None]], axis=1)
-        found = condense(_dynamic_stiffness(linear, exponents[places], ...), relative, loads, cast("Matrix", seen))
+        found = condense(dynamic_stiffness(linear, exponents[places], ...), relative, loads, cast("Matrix", seen))
         stiffness[places], rows[places] = found.stiffness, found.rows
         if orders[places[0]] == 1:
             force, offset = found.force[0], found.offset[0]
@@ -196,45 +183,12 @@ def _condense_shared(linear: LinearModel, relative: IntArray, rates: FloatArray,
     others = np.setdiff1d(np.arange(load.size), relative)
     exponents: ComplexArray = np.asarray(1j * rates[:, None, None], complex)
     rows = np.vstack([linear.response, load.conj()])
-    inner, to_pairs = (_dynamic_stiffness(linear, exponents, np.ix_(others, at)) for at in (others, relative))
+    inner, to_pairs = (dynamic_stiffness(linear, exponents, np.ix_(others, at)) for at in (others, relative))
     compliance = cast("ComplexArray", np.linalg.inv(inner))
     by_pairs = rows[:, relative] - rows[:, others] @ compliance @ to_pairs
     behind = compliance[0] @ load[others]
-    force = load[relative] - _dynamic_stiffness(linear, 1j * float(rates[0]), np.ix_(relative, others)) @ behind
+    force = load[relative] - dynamic_stiffness(linear, 1j * float(rates[0]), np.ix_(relative, others)) @ behind
     return SharedStiffness(linear, relative, rates, compliance), force, by_pairs, rows[:, others] @ behind
-
-
-class Condensed(NamedTuple):
-    """A structure reduced to the relative displacements u (n_rel,).
-
-    - stiffness (n_rel, n_rel): Schur complement, N/m. force (n_rel,): reduced load, N.
-    - rows (k, n_rel), offset (k,): `rows u + offset` is what the given rows make of all displacements.
-    """
-
-    stiffness: Matrix
-    force: Matrix
-    rows: Matrix
-    offset: Matrix
-
-
-def condense(full: Matrix, relative: IntArray, load: Matrix, rows: Matrix | None = None) -> Condensed:
-    """Condensation of a stiffness (n, n), N/m, a load (n,), N, and rows (k, n), with equal leading axes if any.
-
-    Raises numpy.linalg.LinAlgError where the block of the other displacements is singular.
-    """
-    others = np.setdiff1d(np.arange(full.shape[-1]), relative)
-    seen = np.zeros((*full.shape[:-2], 0, full.shape[-1])) if rows is None else rows
-    to_pairs, to_others = full[..., relative, :], full[..., others, :]
-    # the other displacements per u, with the sign reversed, and under the load with u = 0
-    right = np.concatenate([to_others[..., relative], load[..., others, None]], axis=-1)
-    behind = cast("Matrix", np.linalg.solve(to_others[..., others], right))
-    back, by_others = to_pairs[..., others] @ behind, seen[..., others] @ behind
-    return Condensed(
-        to_pairs[..., relative] - back[..., :-1],
-        load[..., relative] - back[..., -1],
-        seen[..., relative] - by_others[..., :-1],
-        by_others[..., -1],
-    )
 
 
 # --- all displacements, and their change with the frequency ---
@@ -251,7 +205,7 @@ def whole_motion(
     n_rel, others, whole = relative.size, np.setdiff1d(np.arange(len(load)), relative), np.zeros(load.shape, complex)
     whole[relative] = moved
     if others.size:
-        rows = _dynamic_stiffness(linear, exponent, np.ix_(others, np.concatenate([relative, others])))
+        rows = dynamic_stiffness(linear, exponent, np.ix_(others, np.concatenate([relative, others])))
         with regular(f"at {abs(exponent) / (2.0 * np.pi):.6g} Hz"):
             whole[others] = np.linalg.solve(rows[:, n_rel:], load[others] - rows[:, :n_rel] @ moved)
     return whole
@@ -300,7 +254,7 @@ def frequency_slope(
     for place, n in enumerate(orders):
         linear, rate = model.harmonic_structure(n), 1j * n * omega
         load = (excitation_amplitude if n == 1 else 0.0) * linear.load_harmonic
-        full = _dynamic_stiffness(linear, rate, ...)
+        full = dynamic_stiffness(linear, rate, ...)
         x, turned = np.zeros((2, len(full)), complex)
         x[relative] = moving[:, place]
         with regular(f"at {n * omega / (2.0 * np.pi):.6g} Hz"):

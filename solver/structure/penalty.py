@@ -15,7 +15,8 @@ from functools import lru_cache
 import numpy as np
 
 from solver.model import BoolArray, FloatArray, IntArray, LinearModel, ReducedModel
-from solver.structure.condensation import condense, regular
+from solver.structure.ring import RingModel
+from solver.structure.schur import condense, regular
 
 INERTIAL_RATIO = 2.0
 """Ratio of the stiffness at twice a rate to the stiffness at the rate, above which a pair is inertial: 1 for a spring,
@@ -69,8 +70,11 @@ def build_penalty(model: ReducedModel, omega: float, highest: int) -> Penalty:
     """Penalty from the condensed `K + s^2 M` at the real rate s = `(highest + 1) omega`, the first harmonic left out.
 
     At a real rate the structure has no resonances: an elastic joint acts as a stiffness, a slider as a mass.
-    omega: rad/s. highest: highest harmonic of the balance.
+    omega: rad/s. highest: highest harmonic of the balance. A ring has that of its sector.
     """
+    if isinstance(model, RingModel):
+        of_sector = build_penalty(model.tuned, omega, highest)
+        return Penalty(*(np.tile(each, model.n_sectors) for each in vars(of_sector).values()))
     rate, contact = (highest + 1) * omega, model.contact
     size = _stiffness_at(model, rate)
     low, high = (_stiffness_at(model, times * INERTIAL_RATE * omega)[:, 1] for times in (1.0, 2.0))

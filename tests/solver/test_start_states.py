@@ -21,7 +21,7 @@ from solver.newton.run import Run, guarded
 from solver.outcome import Outcome
 from solver.packing import Packed
 from solver.settings import Resolution, SolverSettings, all_orders, allowed
-from solver.structure.condensation import condense
+from solver.structure.schur import condense
 from tests.benchmarks.frame import measure
 from tests.benchmarks.values import SCAR
 from tests.random_decks import random_deck, run_deck, static_forces

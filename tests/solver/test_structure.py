@@ -12,10 +12,11 @@ from solver.compliant_contact import LARGEST_CONTACT_STIFFNESS as LARGEST
 from solver.model import needed_nodal_diameters, with_friction
 from solver.modes.modal_model import LinearMode, modal_model
 from solver.structure import condensation
-from solver.structure.condensation import build_structure, condense, frequency_slope
+from solver.structure.condensation import build_structure, frequency_slope
 from solver.structure.fourier import build_basis, from_complex, to_complex
 from solver.structure.harmonic_stiffness import DenseStiffness, SharedStiffness
 from solver.structure.penalty import build_penalty
+from solver.structure.schur import condense
 from studies import build_scene
 from tests.references import den_hartog_amplitude, slider_wear_depth
 from tests.solver.models import OMEGA, cyclic_model, dovetail, random_model, scene
