@@ -29,6 +29,7 @@ from solver.model import FloatArray, IntArray
 from solver.structure.condensation import CACHED_STRUCTURES, CondensedStructure
 from solver.structure.fourier import FourierBasis, build_basis
 from solver.structure.joint import Joint
+from solver.structure.ring_stiffness import RingStiffness
 
 MARCH_PERIODS = 2
 """Periods of a march: slip removes the influence of the start. With one and three ring and damper are equal to 2e-6."""
@@ -54,29 +55,31 @@ class PeriodMatrices(NamedTuple):
 
 @dataclass(frozen=True)
 class PeriodFactor:
-    """March of some pairs (n,) of a joint through the samples of a Fourier basis; coupling (n_rel, 3n): Z / eps - 1."""
+    """Marches of pairs that slip or open through the samples of a Fourier basis: one march of all of them, or, as in
+    a ring, one of each group, whose coupling with the others is left to GMRES.
+
+    parts: pairs, rows (r,) of the group in the joint, coupling (r, 3n): Z / eps - 1, and matrices of each march.
+    """
 
     joint: Joint
     basis: FourierBasis
-    pairs: IntArray
-    coupling: FloatArray
-    matrices: PeriodMatrices
+    parts: tuple[tuple[IntArray, IntArray, FloatArray, PeriodMatrices], ...]
 
     exact = False
 
     @property
     def sign(self) -> float:
         """Sign of the determinant of the march; the truncation of the harmonics may change that of the Jacobian."""
-        return float(np.prod(np.linalg.slogdet(self.matrices.inverse)[0]))
+        return float(np.prod([np.prod(np.linalg.slogdet(matrices.inverse)[0]) for *_, matrices in self.parts]))
 
     def solve(self, right: FloatArray) -> FloatArray:
         """Approximate solution (n_rel, 2H+1) for a right-hand side (n_rel, 2H+1)."""
-        if not self.pairs.size:
-            return right.copy()
-        spread = self.joint.to_pairs(right)
-        right_t = (spread[self.pairs].reshape(-1, right.shape[1]) @ self.basis.synthesis).T
-        state_t = march_samples(np.ascontiguousarray(right_t), self.matrices)
-        return right - self.coupling @ (state_t.T @ self.basis.analysis)
+        found, spread = right.copy(), self.joint.to_pairs(right)
+        for pairs, rows, coupling, matrices in self.parts:
+            right_t = (spread[pairs].reshape(-1, right.shape[1]) @ self.basis.synthesis).T
+            state_t = march_samples(np.ascontiguousarray(right_t), matrices)
+            found[rows] -= coupling @ (state_t.T @ self.basis.analysis)
+        return found
 
 
 def build_period_factor(tangent: Linearisation) -> PeriodFactor | None:
@@ -90,16 +93,32 @@ def build_period_factor(tangent: Linearisation) -> PeriodFactor | None:
         n_samples //= 2
     stride = joint.basis.n_samples // n_samples
     own, carried = joint.law.sample_tangents(at, stride)
-    pairs = np.flatnonzero(own.any(axis=(0, 2, 3)))
-    own, carried = np.ascontiguousarray(own[:, pairs]), np.ascontiguousarray(carried[:, pairs])
-    components = (3 * pairs[:, None] + np.arange(3)).ravel()
-    # rows and columns of displacements that a pair does not have are zero
-    square = np.zeros((3 * joint.contact.n_contact, 3 * joint.contact.n_contact))
-    square[np.ix_(joint.component_index, joint.component_index)] = stiffness_of_most(
-        joint.structure
-    ) / joint.relative_penalty - np.eye(joint.component_index.size)
-    blocks = square[np.ix_(components, components)].reshape(pairs.size, 3, components.size)
-    tangential = np.flatnonzero(np.arange(components.size) % 3)
+    switch, parts = np.asarray(own.any(axis=(0, 2, 3))), []
+    blocks = stiffness_of_most(joint.structure)
+    n_pairs, n_rows = joint.contact.n_contact // len(blocks), joint.component_index.size // len(blocks)
+    for group, stiffness in enumerate(blocks):
+        pairs = n_pairs * group + np.flatnonzero(switch[n_pairs * group : n_pairs * (group + 1)])
+        if not pairs.size:
+            continue
+        rows = np.arange(n_rows * group, n_rows * (group + 1))
+        coupling = np.zeros((n_rows, 3 * n_pairs))
+        components = joint.component_index[rows] - 3 * n_pairs * group
+        # rows and columns of displacements that a pair does not have are zero
+        coupling[:, components] = stiffness / joint.relative_penalty[rows] - np.eye(n_rows)
+        chosen = (3 * (pairs - n_pairs * group)[:, None] + np.arange(3)).ravel()
+        square = np.zeros((3 * n_pairs, chosen.size))
+        square[components] = coupling[:, chosen]
+        matrices = _matrices_of(own[:, pairs], carried[:, pairs], square[chosen].reshape(pairs.size, 3, chosen.size))
+        if matrices is None:
+            return None
+        parts.append((pairs, rows, np.ascontiguousarray(coupling[:, chosen]), matrices))
+    return PeriodFactor(joint, build_basis(joint.basis.orders, n_samples), tuple(parts))
+
+
+def _matrices_of(own: FloatArray, carried: FloatArray, blocks: FloatArray) -> PeriodMatrices | None:
+    """Matrices of the march of n pairs with A and B, and the blocks (n, 3, 3n) of Z / eps - 1; None if singular."""
+    n_samples, n_pairs = own.shape[:2]
+    tangential = np.flatnonzero(np.arange(3 * n_pairs) % 3)
     nonzero = own.any(axis=3).reshape(n_samples, -1)
     row = np.argsort(~nonzero, axis=1, kind="stable")[:, : nonzero.sum(axis=1).max()].copy()
     # single precision suffices for a preconditioner and halves the memory read in a solve
@@ -112,16 +131,22 @@ def build_period_factor(tangent: Linearisation) -> PeriodFactor | None:
         inverse = np.asarray(np.linalg.inv(systems), np.float32)
     except np.linalg.LinAlgError:
         return None
-    coupling = np.ascontiguousarray(square[np.ix_(joint.component_index, components)])
-    matrices = PeriodMatrices(own, carried, row, swept, inverse)
-    return PeriodFactor(joint, build_basis(joint.basis.orders, n_samples), pairs, coupling, matrices)
+    return PeriodMatrices(np.ascontiguousarray(own), np.ascontiguousarray(carried), row, swept, inverse)
 
 
 @lru_cache(maxsize=CACHED_STRUCTURES)
 def stiffness_of_most(structure: CondensedStructure) -> FloatArray:
-    """Real stiffness (n_rel, n_rel), N/m: median of all harmonics, which ignores those near a resonance."""
+    """Real stiffness, N/m: median of all harmonics, which ignores those near a resonance; (G, n, n) of each of G groups
+    of rows that are one after the other: one, or the sectors of a ring.
+    """
+    moving = structure.moving
+    if isinstance(moving, RingStiffness):
+        n = moving.waves.shape[-1]
+        # all sectors have the same block on the diagonal, but for deviations of their blades
+        every = np.concatenate([structure.static_stiffness[None, :n, :n], moving.waves.mean(axis=1).real])
+        return np.broadcast_to(np.median(every, axis=0), (moving.n_sectors, n, n))
     every = np.concatenate([structure.static_stiffness[None], structure.dynamic_stiffness.real])
-    return np.asarray(np.median(every, axis=0, overwrite_input=True))
+    return np.asarray(np.median(every, axis=0, overwrite_input=True))[None]
 
 
 @njit(cache=True)

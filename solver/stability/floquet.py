@@ -17,7 +17,7 @@ otherwise those of the nodal diameters 0 and d. Other waves beside the excited o
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import product
 from typing import Literal
@@ -234,10 +234,17 @@ def _samples(joint: Joint, at: Evaluation) -> int:
     """Samples of a period: up to eight times as many for vibrations that grow in the structure alone, with at least
     `FEWEST_SAMPLES` in a period of the fastest one, which BDF2 then damps by 0.15 %.
     """
-    (switching, stuck), fastest = switching_pairs(at), 0.0
-    driven = [linear for linear in _structures(joint, at) if not _is_passive(linear)]
-    for linear, pairs in product(driven, (stuck, stuck | switching)):
-        found = linear_exponents(linear, moving(joint, pairs))
+    (switching, stuck), fastest, model = switching_pairs(at), 0.0, joint.model
+    structures, of, held = _structures(joint, at), joint, (stuck, stuck | switching)
+    if isinstance(model, RingModel):
+        # rates of its sector in all waves, with the pairs that stick in all sectors
+        structures, of = (
+            list(model.tuned.linear.values()),
+            replace(joint, model=model.tuned, contact=model.tuned.contact),
+        )
+        held = tuple(each.reshape(model.n_sectors, -1).all(axis=0) for each in held)
+    for linear, pairs in product([each for each in structures if not _is_passive(each)], held):
+        found = linear_exponents(linear, moving(of, pairs))
         # round-off of a fast vibration is no growth
         grows = found.real > found.size * ROUNDING * np.abs(found).max(initial=0.0)
         fastest = max(fastest, float(np.abs(found.imag[grows]).max(initial=0.0)))
@@ -260,7 +267,7 @@ def multipliers_of(monodromy: Monodromy, every: bool) -> ComplexArray:
 
     # a fixed start: the result must not depend on earlier computations
     start = np.random.default_rng(0).normal(size=size)
-    values, residuals = ritz_values(passed, start, m * MOST_PRODUCTS, settled)
+    values, residuals = ritz_values(passed, start, monodromy.n_blades * MOST_PRODUCTS, settled)
     known = m * residuals < GROWTH
     return (values[known] if settled(values, residuals) else values[:0]) ** m
 
