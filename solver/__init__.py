@@ -5,6 +5,7 @@ For use in Python, from this package itself:
 - `build_model`: a `ReducedModel` from mass, damping, stiffness and contact pairs;
 - `CubicSprings`, `IwanJoints`: pairs that do not rub, but are on springs or slip little by little, for `build_model`;
 - `with_contact_stiffness`: the model with a spring in series with each pair, as rough surfaces are;
+- `build_ring`: all sectors of a cyclic structure, whose blades may differ, from the model of one;
 - `with_evolution`: the model of a joint whose friction, contact stiffness or wear coefficient change while it rubs;
 - `frequency_response`: the joint over frequency, a `FrequencyResponse`;
 - `backbone`: a nonlinear mode of the joint over its amplitude, a `Backbone`;
@@ -54,6 +55,7 @@ if TYPE_CHECKING:
     from solver.settings import Passage as Passage
     from solver.settings import SolverSettings as SolverSettings
     from solver.settings import WearTarget as WearTarget
+    from solver.structure.ring import build_ring as build_ring
     from solver.whole_response import ResponseCurve as ResponseCurve
     from solver.whole_response import response_curve as response_curve
 
@@ -74,6 +76,7 @@ _NAMES = {
     "results.history": "WearHistory",
     "results.state_report": "PeriodicMotion",
     "settings": "Passage SolverSettings WearTarget",
+    "structure.ring": "build_ring",
     "whole_response": "ResponseCurve response_curve",
 }
 _PLACES = {name: place for place, names in _NAMES.items() for name in names.split()}

@@ -238,11 +238,9 @@ def _samples(joint: Joint, at: Evaluation) -> int:
     structures, of, held = _structures(joint, at), joint, (stuck, stuck | switching)
     if isinstance(model, RingModel):
         # rates of its sector in all waves, with the pairs that stick in all sectors
-        structures, of = (
-            list(model.tuned.linear.values()),
-            replace(joint, model=model.tuned, contact=model.tuned.contact),
-        )
-        held = tuple(each.reshape(model.n_sectors, -1).all(axis=0) for each in held)
+        of, structures = replace(joint, model=model.tuned, contact=model.tuned.contact), [*model.tuned.linear.values()]
+        first, second = (np.asarray(each.reshape(model.n_sectors, -1).all(axis=0)) for each in held)
+        held = (first, second)
     for linear, pairs in product([each for each in structures if not _is_passive(each)], held):
         found = linear_exponents(linear, moving(of, pairs))
         # round-off of a fast vibration is no growth

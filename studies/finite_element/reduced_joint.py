@@ -8,6 +8,7 @@ from scipy import sparse
 
 from solver.model import ContactInterface, FloatArray, LinearModel, Matrix, ReducedModel, needed_nodal_diameters
 from studies.finite_element import solid_mesh
+from studies.finite_element.blade_modes import blade_modes
 from studies.finite_element.elimination import rounding_of
 from studies.finite_element.pairing import ContactPairs
 from studies.finite_element.reduction import PreparedModel
@@ -40,8 +41,8 @@ def build_fe_scene(
 
     Displacements of the reduced model: first the relative ones, pair by pair normal (positive when the pair closes),
     first and second tangent; then modal coordinates of the glued structure. The static load, that of the rotation and
-    the preload, enters nodal diameter 0 only, the unit harmonic load that of the excitation only. The damping is that
-    of the model's matrices, else `loss_factor / omega_1` times the stiffness without prestress where that is known,
+    the preload, enters nodal diameter 0 only, the unit harmonic load that of the excitation only, but for a ring. The
+    damping is that of the model's matrices, else `loss_factor / omega_1` times the stiffness without prestress where that is known,
     omega_1 the first frequency of the glued structure, rad/s, at the nodal diameter of the excitation. Coriolis forces
     are left out. Raises SceneError where the model describes no possible joint.
     """
@@ -49,9 +50,12 @@ def build_fe_scene(
     if excited > n_sectors // 2:
         most = f"use at most n_sectors // 2 = {n_sectors // 2}; more is the same wave turning the other way"
         raise SceneError("nodal_diameter", str(excited), most if n_sectors else "only a cyclic sector has one: use 0")
-    wanted = needed_nodal_diameters(excited, n_sectors, n_harmonics)
     prepared = prepared or prepare_model(model, joint, progress)
+    wanted, whole = needed_nodal_diameters(excited, n_sectors, n_harmonics), options.all_sectors
     vectors = np.stack([prepared.static_load, joint.load, *joint.responses.values()], axis=1)
+    if whole:
+        wanted = tuple(range(n_sectors // 2 + 1))
+        vectors = np.hstack([vectors, blade_modes(prepared, joint.load)[1]])
     linear: dict[int, LinearModel] = {}
     found: dict[int, FloatArray] = {}
     damping = 0.0
@@ -64,14 +68,16 @@ def build_fe_scene(
         if k == excited:
             damping = options.loss_factor / frequencies[0]
         if k in wanted:
-            static, load, *responses = generalised.T
+            static, load, *seen = generalised.T
+            responses, blade = np.split(np.array(seen).conj(), [len(joint.responses)])
             linear[k] = LinearModel(
                 mass=forms["mass"],
                 damping=forms.get("damping", damping * forms.get("elastic", forms["stiffness"])),
                 stiffness=_retained(forms["stiffness"], prepared.pairs, joint),
                 load_static=static.real * (k == 0),
-                load_harmonic=load.astype(complex) * (k == excited),
-                response=np.array(responses).conj(),
+                load_harmonic=load.astype(complex) * (whole or k == excited),
+                response=responses,
+                blade=blade if whole else None,
             )
     contact = _interface(prepared.pairs, joint)
     reduced = ReducedModel({k: linear[k] for k in wanted}, contact, tuple(joint.responses), n_sectors, excited)

@@ -84,11 +84,14 @@ class JointDefinition:
 
 @dataclass(frozen=True)
 class ReductionOptions:
-    """nodal_diameter: of the travelling wave that excites. n_modes: stuck modes. loss_factor: see `build_fe_scene`."""
+    """nodal_diameter: of the travelling wave that excites. n_modes: stuck modes. loss_factor: see `build_fe_scene`.
+    all_sectors: whether for a ring of sectors (`solver.structure.ring`): all nodal diameters, and the blade's modes.
+    """
 
     nodal_diameter: int = 0
     n_modes: int = 20
     loss_factor: float = 1e-3
+    all_sectors: bool = False
 
 
 @dataclass(frozen=True)
