@@ -10,9 +10,9 @@ from studies.finite_element.reduction import PreparedModel
 from studies.scene_error import SceneError
 
 N_MODES = 3
-"""Modes of the blade alone whose frequencies deviate, as fundamental models of mistuning have it. In a ring of 12 dovetail
-sectors, one of them 2 % off, the first family is equal to 3e-5 with 1, 3, 6 and 10 modes; families that other modes of
-the blade make do not deviate (565.8 Hz with six modes is 562.8 Hz with three)."""
+"""Modes of the blade alone whose frequencies deviate, as fundamental models of mistuning have it. With 1, 3, 6 and 10
+of them the first family of a ring of 12 dovetail sectors, one of which is 2 % off, is equal to 3e-5. Families that
+other modes of the blade make do not deviate (565.8 Hz with six modes is 562.8 Hz with three)."""
 
 
 def blade_modes(prepared: PreparedModel, load: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -42,9 +42,9 @@ def build_fe_scene(
     Displacements of the reduced model: first the relative ones, pair by pair normal (positive when the pair closes),
     first and second tangent; then modal coordinates of the glued structure. The static load, that of the rotation and
     the preload, enters nodal diameter 0 only, the unit harmonic load that of the excitation only, but for a ring. The
-    damping is that of the model's matrices, else `loss_factor / omega_1` times the stiffness without prestress where that is known,
-    omega_1 the first frequency of the glued structure, rad/s, at the nodal diameter of the excitation. Coriolis forces
-    are left out. Raises SceneError where the model describes no possible joint.
+    damping is that of the model's matrices, else `loss_factor / omega_1` times the stiffness without prestress where
+    that is known, omega_1 the first frequency of the glued structure, rad/s, at the nodal diameter of the excitation.
+    Coriolis forces are left out. Raises SceneError where the model describes no possible joint.
     """
     excited, n_sectors = options.nodal_diameter, 0 if joint.cut is None else joint.cut.axis.n_sectors
     if excited > n_sectors // 2:
