@@ -1,6 +1,8 @@
 """Rings with all their sectors: blades of point masses whose shrouds touch, and the ring of any travelling wave."""
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,8 +17,8 @@ GROUND, BLADE, SHROUD = 2e6, 4e4, (1e6, 4e5)  # N/m
 DISK, TIP, LEFT, RIGHT = 0, slice(1, 3), slice(3, 5), slice(5, 7)
 
 
-def sector() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Mass and stiffness (7, 7) of a sector alone, and its unit load (7,).
+def sector(deviation: float = 0.0) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Mass and stiffness (7, 7) of a sector alone, its unit load (7,), and rows (2, 7) with the stiffness of its blade.
 
     A disk moves around the axis. A blade, bent in one inclined direction and stiff in the other, carries a shroud.
     """
@@ -26,12 +28,13 @@ def sector() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     stiffness[DISK, DISK], load[TIP] = GROUND, along
     foot = np.zeros((2, 7))
     foot[:, TIP], foot[0, DISK] = np.eye(2), -1.0
-    stiffness += foot.T @ bent @ foot
+    blade = np.linalg.cholesky(bent).T @ foot
+    stiffness += (1.0 + deviation) ** 2 * blade.T @ blade
     for end in (LEFT, RIGHT):
         arm = np.zeros((2, 7))
         arm[:, TIP], arm[:, end] = -np.eye(2), np.eye(2)
         stiffness += arm.T @ np.diag(SHROUD) @ arm
-    return np.diag(MASS), stiffness, load
+    return np.diag(MASS), stiffness, load, blade
 
 
 def contacts(n: int) -> ContactInterface:
@@ -41,29 +44,33 @@ def contacts(n: int) -> ContactInterface:
     return ContactInterface(pairs, np.full(n, 1e-5), np.full(n, -OVERLAP), np.zeros(n), nowhere, n * ("shroud",))
 
 
-def structure(forms: tuple[np.ndarray, np.ndarray], load: np.ndarray, tips: np.ndarray, own: np.ndarray) -> LinearModel:
-    """The structure in other displacements, of which `own` gives the old ones. forms: mass and stiffness."""
-    mass, stiffness = (own.conj().T @ form @ own for form in forms)
-    return LinearModel(mass, LOSS / OMEGA * stiffness, stiffness, np.zeros(len(mass)), own.conj().T @ load, tips @ own)
+def structure(forms: tuple[np.ndarray, ...], load: np.ndarray, tips: np.ndarray, own: np.ndarray) -> LinearModel:
+    """The structure in other displacements, of which `own` gives the old ones. forms: mass, stiffness, damping."""
+    mass, stiffness, damping = (own.conj().T @ form @ own for form in forms)
+    return LinearModel(mass, damping, stiffness, np.zeros(len(mass)), own.conj().T @ load, tips @ own)
 
 
 def one_sector(diameter: int) -> ReducedModel:
     """The sector of a wave, the right end by its displacement relative to the left end of the next sector."""
-    mass, stiffness, load = sector()
+    mass, stiffness, load, blade = sector()
     structures = {}
     for k in range(N // 2 + 1):
         own = np.eye(7, dtype=complex)
         own[RIGHT, LEFT] = np.exp(2j * np.pi * k / N) * np.eye(2)
         whole = stiffness.astype(complex)
         whole[DISK, DISK] += 2.0 * COUPLING * (1.0 - np.cos(2.0 * np.pi * k / N))
-        excited = load if k == min(diameter, N - diameter) else 0.0 * load
-        structures[k] = structure((mass, whole), excited, load[None], own[:, [5, 6, 0, 1, 2, 3, 4]])
+        own = own[:, [5, 6, 0, 1, 2, 3, 4]]
+        one = structure((mass, whole, LOSS / OMEGA * whole), load, load[None], own)
+        structures[k] = replace(one, blade=blade @ own)
     return ReducedModel(structures, contacts(1), ("tip",), N, diameter)
 
 
-def whole_ring(diameter: int) -> ReducedModel:
-    """All sectors and contacts; the right ends by their displacements relative to the left ends of the next sectors."""
-    mass, stiffness, load = sector()
+def whole_ring(diameter: int, deviation: Sequence[float] = N * (0.0,)) -> ReducedModel:
+    """All sectors and contacts; the right ends by their displacements relative to the left ends of the next sectors.
+
+    deviation (N,): of the frequency of each blade, with the damping of the equal ones.
+    """
+    mass, stiffness, load, _ = sector()
     whole, own = np.kron(np.eye(N), stiffness), np.eye(7 * N)
     for j in range(N):
         after = (j + 1) % N
@@ -71,11 +78,17 @@ def whole_ring(diameter: int) -> ReducedModel:
         disks[7 * j], disks[7 * after] = 1.0, -1.0
         whole += COUPLING * np.outer(disks, disks)
         own[7 * j + 5 : 7 * j + 7, 7 * after + 3 : 7 * after + 5] = np.eye(2)
+    damping = LOSS / OMEGA * whole
+    for j, other in enumerate(deviation):
+        at = slice(7 * j, 7 * j + 7)
+        whole[at, at] += sector(other)[1] - stiffness
     relative = (7 * np.arange(N)[:, None] + [5, 6]).ravel()
     others = np.setdiff1d(np.arange(7 * N), relative)
     loads = np.kron(np.exp(2j * np.pi * diameter * np.arange(N) / N), load)
     tips = np.kron(np.eye(N), load)
-    linear = structure((np.kron(np.eye(N), mass), whole), loads, tips, own[:, np.concatenate([relative, others])])
+    linear = structure(
+        (np.kron(np.eye(N), mass), whole, damping), loads, tips, own[:, np.concatenate([relative, others])]
+    )
     return ReducedModel({0: linear}, contacts(N), tuple(f"tip{j}" for j in range(N)))
 
 

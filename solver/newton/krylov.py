@@ -76,24 +76,28 @@ def build_correction(basis: FloatArray, hessenberg: FloatArray) -> tuple[FloatAr
 
 def ritz_values(
     product: Product, start: FloatArray, most: int, enough: Callable[[ComplexArray, FloatArray], bool] | None = None
-) -> tuple[ComplexArray, FloatArray]:
+) -> tuple[ComplexArray, FloatArray, ComplexArray]:
     """Ritz values (k,) of a real operator A by Arnoldi's method; outliers of the spectrum appear first.
 
     start (n,): first vector. most: products. enough: whether values and residuals suffice, asked every `SIGN_PRODUCTS`.
-    Also returns the norms (k,) of `A x - value x` for the Ritz vectors x of norm 1. NaN where no product is finite.
+    Also returns the norms (k,) of `A x - value x` for the Ritz vectors x of norm 1, and that of the largest value (n,).
+    NaN where no product is finite.
     """
 
-    def values_of(hessenberg: FloatArray) -> tuple[ComplexArray, FloatArray]:
+    def values_of(hessenberg: FloatArray) -> tuple[ComplexArray, FloatArray, ComplexArray]:
         if not hessenberg.size:
-            return np.full(1, np.nan, complex), np.full(1, np.nan)
+            return np.full(1, np.nan, complex), np.full(1, np.nan), np.zeros(0, complex)
         values, vectors = np.linalg.eig(hessenberg[:-1])
-        return values.astype(complex), hessenberg[-1, -1] * np.abs(vectors[-1])
+        largest = vectors[:, np.argmax(np.abs(values))]
+        return values.astype(complex), hessenberg[-1, -1] * np.abs(vectors[-1]), largest.astype(complex)
 
     def settled(hessenberg: FloatArray) -> bool:
         often = hessenberg.shape[1] % SIGN_PRODUCTS == 0
-        return often and enough is not None and enough(*values_of(hessenberg))
+        return often and enough is not None and enough(*values_of(hessenberg)[:2])
 
-    return values_of(_arnoldi(product, start, most, settled)[1])
+    basis, hessenberg = _arnoldi(product, start, most, settled)
+    values, residuals, largest = values_of(hessenberg)
+    return values, residuals, largest @ basis[: largest.size]
 
 
 def _arnoldi(

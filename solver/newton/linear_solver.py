@@ -246,7 +246,7 @@ def _sign_by_eigenvalues(factor: Factor, tangent: Linearisation) -> tuple[float,
 
     # a fixed start: the result must not depend on earlier computations
     start = np.random.default_rng(0).normal(size=shape[0] * shape[1])
-    values, residuals = ritz_values(product, start, MOST_PRODUCTS, settled)
+    values, residuals, _ = ritz_values(product, start, MOST_PRODUCTS, settled)
     # complex eigenvalues come in conjugate pairs and do not change the sign
     negative = np.count_nonzero((values.real < 0.0) & (values.imag == 0.0))
     return factor.sign * float((-1) ** negative), settled(values, residuals)

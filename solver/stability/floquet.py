@@ -13,7 +13,8 @@ equation for a small joint that opens and closes; else from integration in time 
 of a large joint).
 
 Disturbances of a travelling wave are those of m sectors (`disturbances`): all of a ring, where they are few or small,
-otherwise those of the nodal diameters 0 and d. Other waves beside the excited one are not tested.
+otherwise those of the nodal diameters 0 and d. A sector whose model has all nodal diameters, and few enough pairs, is
+tested in all sectors of its ring at one time (`ring_state`): other waves may grow beside the excited one.
 """
 
 import math
@@ -46,6 +47,7 @@ from solver.stability.disturbances import (
     pass_period,
     switching_pairs,
 )
+from solver.stability.ring_state import in_ring, knows_ring, wave_of
 from solver.structure.joint import Case, Joint
 from solver.structure.ring import RingModel
 
@@ -80,11 +82,13 @@ class Multipliers:
     """Multipliers of a state, largest modulus first; of a large joint the largest ones only.
 
     error: estimated error of the first value by the time steps. unknown: why its side of 1 may not be known.
+    wave: nodal diameter of which the disturbance of the first value has most; None where it is not known.
     """
 
     values: ComplexArray
     error: float
     unknown: str = "the growth of a small disturbance is not known well enough"
+    wave: int | None = None
 
     def stability(self, odd: bool) -> Stability:
         """Kind of stability; odd: whether Hill's determinant shows an odd number of real multipliers beyond +1."""
@@ -123,6 +127,8 @@ def find_instability(case: Case, state: State, run: Run, with_switching: bool = 
     elif kind == "Neimark-Sacker":
         turn = abs(np.angle(found.values[0])) * joint.omega / (2.0 * np.pi) ** 2
         said = f"{said} and brings a second frequency, {turn:.4g} Hz beside that of the excitation"
+    if found.wave is not None:
+        said = f"{said}, most of it as a wave of nodal diameter {found.wave}"
     doubles = switches and kind == "period doubling"
     return Failure(Outcome.PERIOD_DOUBLED if doubles else Outcome.UNSTABLE, said)
 
@@ -206,7 +212,10 @@ def _sorted(values: ComplexArray) -> ComplexArray:
 
 def _integrated(joint: Joint, at: Evaluation, rtol: float, growing_only: bool) -> Multipliers:
     """Multipliers by integration in time; samples are doubled until the first one is known, or its side of 1."""
-    n_sectors, sizes = _sectors(joint, at), list[float]()
+    sizes, rows = list[float](), 3 * np.count_nonzero(switching_pairs(at)[0])
+    if knows_ring(joint.model) and joint.model.n_sectors * rows <= MOST_ROWS:
+        joint, at = in_ring(joint, at)
+    n_sectors = _sectors(joint, at)
     every = n_sectors * _moving(joint, at) <= SMALL_JOINT
     n_samples = _samples(joint, at) // (1 if growing_only else 2)
     # fewer cannot tell the harmonics of the state apart
@@ -214,7 +223,8 @@ def _integrated(joint: Joint, at: Evaluation, rtol: float, growing_only: bool) -
         n_samples *= 2
     most = 8 * (n_samples if every else min(n_samples, SMALL_SAMPLES))
     while True:
-        values = _sorted(multipliers_of(build_monodromy(joint, at, n_samples, n_sectors), every))
+        values, largest_one = multipliers_of(build_monodromy(joint, at, n_samples, n_sectors), every)
+        values = _sorted(values)
         if not values.size:
             return Multipliers(values, np.inf)
         # growth is a matter of the modulus: of multipliers of equal modulus another one may come first
@@ -226,7 +236,10 @@ def _integrated(joint: Joint, at: Evaluation, rtol: float, growing_only: bool) -
         # where all pairs slip and open, values scatter, and two of them may agree by chance
         enough = known and len(sizes) > (2 if grows else 1)
         if enough or (growing_only and not grows and len(sizes) == 1) or 2 * n_samples > most:
-            return Multipliers(values, error)
+            wave = None
+            if grows and isinstance(joint.model, RingModel):
+                wave = wave_of(largest_one[: _moving(joint, at)], joint.model.n_sectors)
+            return Multipliers(values, error, wave=wave)
         n_samples *= 2
 
 
@@ -251,11 +264,14 @@ def _samples(joint: Joint, at: Evaluation) -> int:
     return int(np.clip(wanted, fewest, HILL_SAMPLES))
 
 
-def multipliers_of(monodromy: Monodromy, every: bool) -> ComplexArray:
-    """All multipliers, or the largest ones; none where the largest one has not converged by Arnoldi's method."""
+def multipliers_of(monodromy: Monodromy, every: bool) -> tuple[ComplexArray, ComplexArray]:
+    """All multipliers, or the largest ones; none where the largest one has not converged by Arnoldi's method. With the
+    disturbance (4n + p q,) of the largest one.
+    """
     size, m = monodromy.turn.size, monodromy.n_sectors
     if every:
-        return np.asarray(np.linalg.eigvals(pass_period(monodromy, np.eye(size))), np.complex128) ** m
+        values, vectors = np.linalg.eig(pass_period(monodromy, np.eye(size)))
+        return np.asarray(values, np.complex128) ** m, vectors[:, np.argmax(np.abs(values))]
 
     def passed(vector: FloatArray) -> FloatArray:
         return pass_period(monodromy, vector[:, None])[:, 0]
@@ -265,9 +281,9 @@ def multipliers_of(monodromy: Monodromy, every: bool) -> ComplexArray:
 
     # a fixed start: the result must not depend on earlier computations
     start = np.random.default_rng(0).normal(size=size)
-    values, residuals = ritz_values(passed, start, monodromy.n_blades * MOST_PRODUCTS, settled)
+    values, residuals, largest = ritz_values(passed, start, monodromy.n_blades * MOST_PRODUCTS, settled)
     known = m * residuals < GROWTH
-    return (values[known] if settled(values, residuals) else values[:0]) ** m
+    return (values[known] if settled(values, residuals) else values[:0]) ** m, largest
 
 
 @lru_cache(maxsize=16)

@@ -1,0 +1,164 @@
+"""A ring of sectors: equal sectors move as one, the linear ring has its full matrices, and blades deviate."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.optimize import minimize
+
+from solver.arguments import check_case
+from solver.forced_response import balance_at_start, frequency_response
+from solver.histories import march_wear
+from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel
+from solver.outcome import Outcome
+from solver.settings import SolverSettings
+from solver.stability.disturbances import build_monodromy
+from solver.stability.floquet import multipliers_of
+from solver.structure.condensation import build_structure
+from solver.structure.ring import build_ring
+from tests.rings import N, one_sector, whole_ring
+
+PATTERN = np.array([0.02, -0.013, 0.0, 0.007, -0.018, 0.011])
+RATE, ORDERS = 2.0 * np.pi * 280.0, (1, 2, 3)
+
+
+def at_one_time(values_h: FloatArray, diameter: int, orders: tuple[int, ...] = ORDERS) -> np.ndarray:
+    """Complex amplitudes (N, k, H) of all sectors at one time, from those (N k, 2H+1) at the own time of each."""
+    amplitudes = (values_h[:, 1::2] - 1j * values_h[:, 2::2]).reshape(N, -1, len(orders))
+    turn = np.exp(2j * np.pi * diameter / N * np.multiply.outer(np.arange(N), np.array(orders)))
+    return amplitudes * turn[:, None]
+
+
+@pytest.mark.parametrize("diameter", [0, 1, 3, 5])
+def test_equal_sectors_have_the_condensed_sector(diameter):
+    sector = one_sector(diameter)
+    one, ring = (build_structure(model, RATE, 3.0, ORDERS) for model in (sector, build_ring(sector)))
+    motion = np.random.default_rng(0).normal(size=(2, 7))
+    everywhere = np.tile(motion, (N, 1))
+    for alone, together in (
+        (one.apply(motion), ring.apply(everywhere)),
+        (one.force_h, ring.force_h),
+        (one.response_h(motion), ring.response_h(everywhere)),
+    ):
+        # at nodal diameter 0 the force of the pairs is zero
+        assert np.abs(np.tile(alone, (N, 1)) - together).max() <= 1e-12 * np.abs(alone).max() + 1e-14
+    assert ring.input_work(everywhere) == pytest.approx(N * one.input_work(motion), rel=1e-12)
+
+
+@pytest.mark.parametrize("diameter", [0, 1, 3, 4])
+@pytest.mark.parametrize("deviation", [np.eye(N)[2] * 0.01, PATTERN])
+def test_a_ring_with_deviating_blades_is_that_of_its_full_matrices(diameter, deviation):
+    ring = build_structure(build_ring(one_sector(diameter), deviation), RATE, 3.0, ORDERS)
+    full = build_structure(whole_ring(diameter, deviation), RATE, 3.0, ORDERS)
+    motion_h = np.random.default_rng(1).normal(size=(2 * N, 7))
+    moved = at_one_time(motion_h, diameter)
+    together = motion_h.copy()
+    together[:, 1::2], together[:, 2::2] = (part.reshape(2 * N, -1) for part in (moved.real, -moved.imag))
+    for own, at_once in (
+        (ring.apply(motion_h), full.apply(together)),
+        (ring.force_h, full.force_h),
+        (ring.response_h(motion_h), full.response_h(together)),
+    ):
+        right = (at_once[:, 1::2] - 1j * at_once[:, 2::2]).reshape(N, -1, len(ORDERS))
+        assert np.abs(at_one_time(own, diameter) - right).max() <= 1e-9 * np.abs(right).max()
+        assert np.abs(own[:, 0] - at_once[:, 0]).max() <= 1e-9 * max(np.abs(at_once[:, 0]).max(), 1e-300)
+    assert ring.input_work(motion_h) == pytest.approx(full.input_work(together), rel=1e-9)
+
+
+def test_products_are_those_of_the_matrices():
+    structure = build_structure(build_ring(one_sector(1), PATTERN), RATE, 3.0, ORDERS)
+    random = np.random.default_rng(2)
+    motion_h, weight = random.normal(size=(2, 2 * N, 7))
+    amplitudes = motion_h[:, 1::2] - 1j * motion_h[:, 2::2]
+    wanted = np.einsum("hij,jh->ih", structure.dynamic_stiffness, amplitudes)
+    assert np.abs(structure.moving.apply(motion_h) - wanted).max() <= 1e-12 * np.abs(wanted).max()
+    assert np.abs(structure.moving.single.apply(motion_h) - wanted).max() <= 1e-5 * np.abs(wanted).max()
+    forward, backward = structure.apply(motion_h), structure.apply_transposed(weight)
+    assert (forward * weight).sum() == pytest.approx((motion_h * backward).sum(), rel=1e-12)
+
+
+def test_a_force_on_one_blade_is_that_of_the_full_matrices():
+    ring = build_structure(build_ring(one_sector(0), PATTERN, forced_sector=2), RATE, 3.0, (1,))
+    full = whole_ring(0, PATTERN)
+    # the displacements of all pairs come first, then the others sector by sector
+    driven = full.linear[0].load_harmonic * np.concatenate([np.zeros(2 * N), np.repeat(np.arange(N) == 2, 5)])
+    assert np.count_nonzero(driven) == 2
+    whole = replace(full, linear={0: replace(full.linear[0], load_harmonic=driven)})
+    wanted = build_structure(whole, RATE, 3.0, (1,))
+    assert np.abs(ring.force_h - wanted.force_h).max() <= 1e-9 * np.abs(wanted.force_h).max()
+    motion_h = np.random.default_rng(3).normal(size=(2 * N, 3))
+    assert np.allclose(ring.response_h(motion_h), wanted.response_h(motion_h), rtol=1e-9, atol=1e-12)
+
+
+def blades_on_a_stiff_disk(coupling: float, loss: float) -> ReducedModel:
+    """A sector of one mass, 1 kg on 1 N/m, coupled to its neighbours, and of one pair that stays as it is."""
+    structures = {}
+    for k in range(N // 2 + 1):
+        stiffness = np.diag([1.0, 1.0 + 2.0 * coupling * (1.0 - np.cos(2.0 * np.pi * k / N))])
+        mass, load = np.diag([1e-3, 1.0]), np.array([0.0, 1.0])
+        one = LinearModel(mass, loss * stiffness, stiffness, 0.0 * load, load.astype(complex), load[None])
+        structures[k] = replace(one, blade=load[None])
+    pair = np.array([[0, -1, -1]]), *np.ones((3, 1)), np.zeros((1, 3)), ("root",)
+    return ReducedModel(structures, ContactInterface(*pair), ("tip",), N, 1)
+
+
+def largest(sector: ReducedModel, deviation: FloatArray, rates: FloatArray) -> float:
+    """Largest amplitude of any blade of a linear ring whose pairs stick, m."""
+    model = build_ring(sector, deviation)
+    return max(float(np.abs(build_structure(model, rate, 1.0, (1,)).harmonic_offset).max()) for rate in rates)
+
+
+@pytest.mark.slow
+def test_amplification_by_deviations_keeps_to_whiteheads_bound_and_comes_near_it():
+    sector, random, bound = blades_on_a_stiff_disk(2e-3, 1e-3), np.random.default_rng(4), 0.5 * (1.0 + np.sqrt(N))
+    tuned = largest(sector, np.zeros(N), 1.0 + np.linspace(0.0, 4e-3, 401))
+    drawn = 4e-3 * random.standard_normal((1000, N))
+    found = np.array([largest(sector, each, 1.0 + np.linspace(-6e-3, 1e-2, 9)) for each in drawn]) / tuned
+    assert 1.0 < found.max() <= bound
+
+    def opposite(x: FloatArray) -> float:
+        return -largest(sector, 1e-3 * x[:N], 1.0 + 1e-3 * x[N:])
+
+    start = [*1e3 * drawn[found.argmax()], 1.0]
+    worst = minimize(opposite, start, method="Nelder-Mead", options={"maxfev": 3000})
+    assert 0.9 * bound <= -worst.fun / tuned <= bound
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("diameter", "frequency", "load"), [(1, 280.0, 3.3), (3, 320.0, 12.0)])
+def test_equal_sectors_rub_and_wear_as_one(diameter, frequency, load):
+    sector = one_sector(diameter)
+    one, ring = (march_wear(model, frequency, load, 0.3, 1e-10, 100.0) for model in (sector, build_ring(sector)))
+    assert ring.outcome.complete
+    assert ring.worn_volume[-1] == pytest.approx(N * one.worn_volume[-1], rel=2e-4)
+    assert np.ptp(ring.wear_depth[-1]) <= 2e-3 * ring.wear_depth[-1].max()
+    assert 0.5 <= ring.worn_volume_error[-1] / one.worn_volume_error[-1] <= 2.0
+    assert np.abs(ring.response[0] - one.response[0]).max() <= 1e-4 * np.abs(one.response[0, 0])
+
+
+def test_a_wave_beside_which_others_grow_is_unstable():
+    # by time integration of the ring (`tests.benchmarks.ring`) the other waves grow by 1.09 in a period
+    worn, settings = np.array([3.127e-6]), SolverSettings(harmonics=13, samples=360)
+    fresh, later = (
+        frequency_response(one_sector(2), [300.0], 10.0, 0.3, settings=settings, wear_depth=depth)
+        for depth in (np.zeros(1), worn)
+    )
+    assert fresh.outcome[0].complete
+    assert later.outcome[0] is Outcome.UNSTABLE
+    assert "nodal diameter 1" in later.message[0]
+
+
+def test_a_ring_with_deviating_blades_vibrates_and_grows_as_its_full_matrices():
+    # the full matrices see all sectors at one time
+    settings, states = SolverSettings(harmonics=9, samples=360), []
+    for model in (build_ring(one_sector(1), PATTERN), whole_ring(1, PATTERN)):
+        checked = check_case(model, 3.3, 0.3, "up", settings)
+        _, case, _, state = balance_at_start(checked[0], checked[1], 280.0, "up", settings)
+        joint = state.joint(case)
+        response_h = joint.structure.response_h(joint.motion(state.evaluation))
+        multipliers, _ = multipliers_of(build_monodromy(joint, state.evaluation, 360), every=True)
+        states.append((np.hypot(*response_h[:, 1:3].T), np.sort(np.abs(multipliers))[-6:]))
+    (one, growth), (other, its) = states
+    assert np.ptp(one) > 0.01 * one.max()
+    assert np.abs(one - other).max() <= 1e-3 * other.max()
+    assert np.abs(growth - its).max() <= 1e-3
