@@ -128,12 +128,16 @@ def stiffened(model: ReducedModel, contact: ContactInterface) -> ReducedModel:
         return model
     table, linear = np.asarray(evolution.contact_stiffness), dict[int, LinearModel]()
     first, springs = (_springs(contact, each)[1] for each in (table[:, 0], now[0]))
-    n = len(model.linear[0].mass) - first.size
-    scale = _scale_of(model.linear[0].stiffness[:n, :n], first)
+    # the compressions are the last displacements, of a ring those of each sector
+    size, count = len(model.linear[0].mass) // model.n_repeated, first.size // model.n_repeated
+    own = (size * np.arange(model.n_repeated)[:, None] + np.arange(size - count, size)).ravel()
+    others = np.delete(np.arange(len(model.linear[0].mass)), own)
+    scale = _scale_of(model.linear[0].stiffness[np.ix_(others, others)], first)
     for k, each in model.linear.items():
         stiffness = each.stiffness.copy()
-        stiffness[range(n, n + first.size), range(n, n + first.size)] += (springs - first) * scale**2
-        linear[k] = replace(each, stiffness=stiffness)
+        stiffness[own, own] += (springs - first) * scale**2
+        parts = each.mass, each.damping, stiffness, each.load_static, each.load_harmonic, each.response
+        linear[k] = LinearModel(*parts, each.blade)
     return replace(model, linear=linear)
 
 

@@ -268,6 +268,11 @@ class ReducedModel:
     n_sectors: int = 0
     nodal_diameter: int = 0
 
+    @property
+    def n_repeated(self) -> int:
+        """Equal parts that follow each other in the displacements: 1, or the sectors of a ring."""
+        return 1
+
     def harmonic_structure(self, harmonic: int) -> "LinearModel":
         """Linear model in which a harmonic moves: that of nodal diameter `n d` modulo N, conjugate above N/2.
 

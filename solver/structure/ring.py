@@ -142,6 +142,11 @@ class RingModel(ReducedModel):
         assert self.sector is not None
         return self.sector
 
+    @property
+    def n_repeated(self) -> int:
+        """As in `ReducedModel`."""
+        return self.n_sectors
+
     @cached_property
     def phase_steps(self) -> int:
         """Equal steps in which the phases of all sectors divide a period."""
