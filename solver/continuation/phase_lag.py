@@ -4,7 +4,7 @@ With the first harmonics x of all displacements and F of the excitation, `F^H x 
 from 0 below a resonance to pi above; the excitation does most work in phase resonance, at the lag pi/2. The frequency
 is the further unknown of a bordered balance, and `sin(arg(F^H x) + lag) = 0` the further equation. At the largest
 amplitude of the first response, in its first harmonic, the rise of the amplitude with the lag is zero; a secant finds
-this lag.
+this lag. Of a ring it is the first response of the blade that moves most.
 """
 
 import cmath
@@ -129,7 +129,10 @@ def rise_of_response(state: Bordered, run: Run, accuracy: float) -> tuple[float,
     by_frequency = frequency_derivative(fixed, at)
     (step,) = run.steps(fixed, at, [-by_frequency.force], min(FORCING, 0.1 * accuracy))
     product, response = _changes(joint, fixed.linearise(at).rest_and_motion(step)[1])
-    rise = (by_frequency.response[0] + response[0]) / first_response(joint, at)[0]
+    responses = first_response(joint, at)
+    each = len(responses) // joint.model.n_repeated
+    largest = each * int(np.argmax(np.abs(responses[::each])))
+    rise = (by_frequency.response[largest] + response[largest]) / responses[largest]
     turn = (by_frequency.product + product) / excitation_product(joint, at)
     return float(rise.real), -turn.imag
 

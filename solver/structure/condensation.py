@@ -6,18 +6,17 @@ into those of the pairs (r) and all others (i),
     Z_r = A_rr - A_ri A_ii^-1 A_ir,      F_r = f_r - A_ri A_ii^-1 f_i.                                         (8)
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import cast
 
 import numpy as np
-from scipy.linalg.lapack import zgetrf, zgetrs
 
 from solver.model import ComplexArray, FloatArray, IntArray, LinearModel, Matrix, ReducedModel
 from solver.structure.fourier import from_complex, to_complex
 from solver.structure.harmonic_stiffness import DenseStiffness, SharedStiffness
 from solver.structure.ring import RingStructure
+from solver.structure.ring_motion import motion_of
 from solver.structure.ring_stiffness import RingStiffness, condense_ring
 from solver.structure.schur import condense, dynamic_stiffness, regular
 
@@ -202,13 +201,11 @@ def whole_motion(
     Both change with exp(s t); exponent: s, 1/s, `i n w` in harmonic n.
     Raises SingularStructureError where the structure with a stuck joint is singular.
     """
-    n_rel, others, whole = relative.size, np.setdiff1d(np.arange(len(load)), relative), np.zeros(load.shape, complex)
-    whole[relative] = moved
-    if others.size:
-        rows = dynamic_stiffness(linear, exponent, np.ix_(others, np.concatenate([relative, others])))
-        with regular(f"at {abs(exponent) / (2.0 * np.pi):.6g} Hz"):
-            whole[others] = np.linalg.solve(rows[:, n_rel:], load[others] - rows[:, :n_rel] @ moved)
-    return whole
+    given = np.zeros(load.shape, complex)
+    given[relative] = moved
+    of = motion_of(linear, exponent, relative)
+    with regular(f"at {abs(exponent) / (2.0 * np.pi):.6g} Hz"):
+        return given + of.behind(load - of.force(given))
 
 
 @dataclass(frozen=True)
@@ -225,16 +222,6 @@ class FrequencySlope:
     slip_work: FloatArray
 
 
-def _factorised(matrix: ComplexArray) -> Callable[[ComplexArray], ComplexArray]:
-    """Solutions (n,) of systems with one matrix (n, n), which may be empty."""
-    if not matrix.size:
-        return lambda right: right
-    factor, pivots, singular = zgetrf(matrix)
-    if singular:
-        raise np.linalg.LinAlgError
-    return lambda right: cast("ComplexArray", zgetrs(factor, pivots, right)[0])
-
-
 def frequency_slope(
     model: ReducedModel, omega: float, excitation_amplitude: float, orders: tuple[int, ...], displacement_h: FloatArray
 ) -> FrequencySlope:
@@ -248,22 +235,19 @@ def frequency_slope(
     resonance that is followed.
     """
     relative, moving = model.contact.relative, to_complex(displacement_h)
-    others = np.setdiff1d(np.arange(len(model.linear[0].mass)), relative)
     force, product = np.zeros((relative.size, len(orders)), complex), 0.0 + 0.0j
-    response = np.zeros(model.linear[0].response.shape[0], complex)
+    response = np.zeros(len(model.response_names), complex)
     for place, n in enumerate(orders):
         linear, rate = model.harmonic_structure(n), 1j * n * omega
         load = (excitation_amplitude if n == 1 else 0.0) * linear.load_harmonic
-        full = dynamic_stiffness(linear, rate, ...)
-        x, turned = np.zeros((2, len(full)), complex)
+        of, x = motion_of(linear, rate, relative), np.zeros(load.size, complex)
         x[relative] = moving[:, place]
         with regular(f"at {n * omega / (2.0 * np.pi):.6g} Hz"):
-            solve = _factorised(full[np.ix_(others, others)])
-        x[others] = solve(load[others] - full[np.ix_(others, relative)] @ moving[:, place])
-        slope = 1j * n * (linear.damping @ x) - 2.0 * n**2 * omega * (linear.mass @ x)
-        turned[others] = solve(-slope[others])
-        force[:, place] = slope[relative] + full[np.ix_(relative, others)] @ turned[others]
+            x += of.behind(load - of.force(x))
+            slope = 1j * n * of.times("damping", x) - 2.0 * n**2 * omega * of.times("mass", x)
+            turned = of.behind(-slope)
+        force[:, place] = (slope + of.force(turned))[relative]
         if n == 1:
-            product, response = complex(load.conj() @ turned), linear.response @ turned
+            product, response = complex(load.conj() @ turned), of.times("response", turned)
     still = np.zeros(relative.size), np.zeros(model.contact.n_contact)
     return FrequencySlope(from_complex(still[0], force), product, response, still[1])

@@ -14,11 +14,12 @@ from solver.outcome import Outcome
 from solver.settings import SolverSettings
 from solver.stability.disturbances import build_monodromy
 from solver.stability.floquet import multipliers_of
-from solver.structure.condensation import build_structure
+from solver.structure.condensation import build_structure, frequency_slope, whole_motion
 from solver.structure.ring import build_ring
 from tests.rings import N, one_sector, whole_ring
 
 PATTERN = np.array([0.02, -0.013, 0.0, 0.007, -0.018, 0.011])
+NAMES = ("mass", "damping", "stiffness", "load_static", "load_harmonic", "response")
 RATE, ORDERS = 2.0 * np.pi * 280.0, (1, 2, 3)
 
 
@@ -75,6 +76,23 @@ def test_products_are_those_of_the_matrices():
     assert np.abs(structure.moving.single.apply(motion_h) - wanted).max() <= 1e-5 * np.abs(wanted).max()
     forward, backward = structure.apply(motion_h), structure.apply_transposed(weight)
     assert (forward * weight).sum() == pytest.approx((motion_h * backward).sum(), rel=1e-12)
+
+
+@pytest.mark.parametrize("deviation", [np.zeros(N), PATTERN])
+def test_all_displacements_and_the_slope_over_the_frequency_are_those_of_the_full_matrices(deviation):
+    ring, orders, random = build_ring(one_sector(1), deviation), (1, 2), np.random.default_rng(5)
+    motion_h, dofs = random.normal(size=(2 * N, 5)), ring.contact.relative
+    linear, moved = ring.harmonic_structure(1), random.normal(size=2 * N) + 0.0j
+    by_waves = whole_motion(linear, 1j * RATE, dofs, linear.load_harmonic, moved)
+    assembled = LinearModel(*(getattr(linear, name) for name in NAMES))
+    by_matrix = whole_motion(assembled, 1j * RATE, dofs, linear.load_harmonic, moved)
+    assert np.abs(by_waves - by_matrix).max() <= 1e-9 * np.abs(by_matrix).max()
+    slope, step = frequency_slope(ring, RATE, 3.0, orders, motion_h), 1e-5 * RATE
+    before, after = (build_structure(ring, RATE + way * step, 3.0, orders) for way in (-1.0, 1.0))
+    force = (after.apply(motion_h) - after.force_h - before.apply(motion_h) + before.force_h) / (2.0 * step)
+    assert np.abs(slope.force - force).max() <= 1e-5 * np.abs(force).max()
+    response = (after.response_h(motion_h) - before.response_h(motion_h))[:, 1:3] / (2.0 * step)
+    assert np.abs(slope.response - response @ [1.0, -1.0j]).max() <= 1e-5 * np.abs(response).max()
 
 
 def test_a_force_on_one_blade_is_that_of_the_full_matrices():
