@@ -100,7 +100,7 @@ def sliding_start(balance: Balance, rest: State) -> FloatArray | None:
     pushed = np.where(rows >= 0, load[rows], 0.0)
     if (np.linalg.norm(pushed[:, 1:], axis=1) <= limit).any():
         return None
-    moved = np.where(rows >= 0, np.linalg.solve(structure.dynamic_stiffness[0], load)[rows], 0.0)
+    moved = np.where(rows >= 0, structure.moving.solve(slice(1), load[:, None])[rows, 0], 0.0)
     friction, size = np.zeros_like(moved), np.maximum(np.linalg.norm(moved[:, 1:], axis=1), 1e-300)
     friction[:, 1:] = (4j / np.pi * limit / size)[:, None] * moved[:, 1:]
     motion_h, force_h = at.displacement_h.copy(), at.force_h.copy()

@@ -105,7 +105,7 @@ def transfer(case: Case, state: State, joint: Joint, *, with_tail: bool = False)
         tail = build_basis(tuple(np.array(orders)[new].tolist()), evaluation.force_t.shape[2]).analysis[:, 1:]
         force = joint.to_relative(evaluation.force_t @ tail)
         amplitudes = force[:, ::2] - 1j * force[:, 1::2]
-        moved = -np.linalg.solve(joint.structure.dynamic_stiffness[new], amplitudes.T[:, :, None])[:, :, 0].T
+        moved = -joint.structure.moving.solve(new, amplitudes)
         for part, found in ((force_h, amplitudes), (motion_h, moved)):
             part[:, 2 * new + 1], part[:, 2 * new + 2] = found.real, -found.imag
     return balance, balance.predict(joint.to_pairs(motion_h), joint.to_pairs(force_h))
@@ -150,6 +150,5 @@ def _tail_h(joint: Joint, evaluation: Evaluation, orders: tuple[int, ...]) -> Fl
     except SingularStructureError:
         return np.zeros((still.size, 2 * len(orders) + 1))
     force_h = joint.law.tail(evaluation, build_basis(orders, joint.basis.n_samples))
-    force = to_complex(joint.to_relative(force_h)).T[:, :, None]
-    moved = -np.linalg.solve(structure.dynamic_stiffness, force)
-    return from_complex(still, np.matmul(structure.dynamic_response, moved)[:, :, 0].T)
+    moved = -structure.moving.solve(slice(None), to_complex(joint.to_relative(force_h)))
+    return from_complex(still, np.matmul(structure.dynamic_response, moved.T[:, :, None])[:, :, 0].T)

@@ -10,6 +10,11 @@ from solver.model import ComplexArray, FloatArray, IntArray, LinearModel
 from solver.structure.fourier import from_complex, to_complex
 
 
+def solved(matrices: ComplexArray, right: ComplexArray) -> ComplexArray:
+    """Solutions (n, k) of systems with k matrices (k, n, n), for right-hand sides (n, k)."""
+    return cast("ComplexArray", np.linalg.solve(matrices, right.T[:, :, None])[:, :, 0].T)
+
+
 @dataclass(frozen=True)
 class DenseStiffness:
     """Z_r at H harmonics above the static one, for any structure. dense: (H, n_rel, n_rel), N/m."""
@@ -25,6 +30,10 @@ class DenseStiffness:
         """Amplitudes (n_rel, H) of the conjugate transpose of Z_r, which is the transposed real matrix, times y."""
         moving = np.ascontiguousarray(to_complex(force_h).T)[:, None, :]
         return cast("ComplexArray", np.matmul(moving.conj(), self.dense)[:, 0, :].conj().T)
+
+    def solve(self, places: slice | IntArray, force: ComplexArray) -> ComplexArray:
+        """Amplitudes (n_rel, k), m, with `Z_r u = force` (n_rel, k), N, at some of the harmonics."""
+        return solved(self.dense[places], force)
 
     @cached_property
     def single(self) -> "DenseStiffness":
@@ -82,6 +91,10 @@ class SharedStiffness:
     def apply_transposed(self, force_h: FloatArray) -> ComplexArray:
         """As in `DenseStiffness`: a real structure is symmetric."""
         return np.conj(self.apply(from_complex(force_h[:, 0], np.conj(to_complex(force_h)))))
+
+    def solve(self, places: slice | IntArray, force: ComplexArray) -> ComplexArray:
+        """As in `DenseStiffness`."""
+        return solved(self.dense[places], force)
 
     @cached_property
     def single(self) -> "SharedStiffness":

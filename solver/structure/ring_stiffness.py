@@ -69,6 +69,21 @@ class RingStiffness:
             force += np.matmul(pushed, fft.fft(back, axis=1))
         return cast("ComplexArray", fft.ifft(force, axis=1).reshape(n_orders, n * size).T)
 
+    def solve(self, places: slice | IntArray, force: ComplexArray) -> ComplexArray:
+        """As in `DenseStiffness`."""
+        waves, seen, pushed = self.waves[places], self.seen[places], self.pushed[places]
+        n_orders, n, size, _ = waves.shape
+        moved = np.linalg.solve(waves, fft.fft(force.T.reshape(n_orders, n, size, 1), axis=1))
+        if self.deviating is not None:
+            # u = Z^-1 (force - L y) with y = W Q u
+            deviating, softened = self.deviating[places], np.linalg.solve(waves, pushed)
+            through = np.array([over_sectors(each) for each in seen @ softened])
+            blades = fft.ifft(seen @ moved, axis=1).reshape(n_orders, -1, 1)
+            system = np.eye(through.shape[-1]) + deviating @ through
+            back = np.linalg.solve(system, deviating @ blades).reshape(n_orders, n, -1, 1)
+            moved = moved - softened @ fft.fft(back, axis=1)
+        return cast("ComplexArray", fft.ifft(moved, axis=1).reshape(n_orders, n * size).T)
+
     @property
     def dense(self) -> ComplexArray:
         """As in `DenseStiffness`; computed at each call."""

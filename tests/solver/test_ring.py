@@ -74,6 +74,9 @@ def test_products_are_those_of_the_matrices():
     wanted = np.einsum("hij,jh->ih", structure.dynamic_stiffness, amplitudes)
     assert np.abs(structure.moving.apply(motion_h) - wanted).max() <= 1e-12 * np.abs(wanted).max()
     assert np.abs(structure.moving.single.apply(motion_h) - wanted).max() <= 1e-5 * np.abs(wanted).max()
+    places = np.array([0, 2])
+    found = structure.moving.solve(places, wanted[:, places])
+    assert np.abs(found - amplitudes[:, places]).max() <= 1e-9 * np.abs(amplitudes).max()
     forward, backward = structure.apply(motion_h), structure.apply_transposed(weight)
     assert (forward * weight).sum() == pytest.approx((motion_h * backward).sum(), rel=1e-12)
 
