@@ -286,7 +286,7 @@ class Linearisation:
         matrix[:, 0] += structure.static_stiffness[np.ix_(rows, rows)] @ motion[:, 0]
         if k > 1:
             amplitude = (motion[:, 1::2] - 1j * motion[:, 2::2]).transpose(1, 0, 2)
-            stiffness = structure.dynamic_stiffness[: k // 2, rows[:, None], rows]
+            stiffness = structure.moving.block(k // 2, rows)
             moved = np.matmul(stiffness, amplitude).transpose(1, 0, 2)
             matrix[:, 1::2] += moved.real
             matrix[:, 2::2] -= moved.imag

@@ -31,6 +31,10 @@ class DenseStiffness:
         moving = np.ascontiguousarray(to_complex(force_h).T)[:, None, :]
         return cast("ComplexArray", np.matmul(moving.conj(), self.dense)[:, 0, :].conj().T)
 
+    def block(self, count: int, rows: IntArray) -> ComplexArray:
+        """Z_r (count, n, n) of the lowest harmonics, in some rows and columns (n,)."""
+        return self.dense[:count, rows[:, None], rows]
+
     def solve(self, places: slice | IntArray, force: ComplexArray) -> ComplexArray:
         """Amplitudes (n_rel, k), m, with `Z_r u = force` (n_rel, k), N, at some of the harmonics."""
         return solved(self.dense[places], force)
@@ -91,6 +95,10 @@ class SharedStiffness:
     def apply_transposed(self, force_h: FloatArray) -> ComplexArray:
         """As in `DenseStiffness`: a real structure is symmetric."""
         return np.conj(self.apply(from_complex(force_h[:, 0], np.conj(to_complex(force_h)))))
+
+    def block(self, count: int, rows: IntArray) -> ComplexArray:
+        """As in `DenseStiffness`."""
+        return self.dense[:count, rows[:, None], rows]
 
     def solve(self, places: slice | IntArray, force: ComplexArray) -> ComplexArray:
         """As in `DenseStiffness`."""

@@ -69,6 +69,12 @@ class RingStiffness:
             force += np.matmul(pushed, fft.fft(back, axis=1))
         return cast("ComplexArray", fft.ifft(force, axis=1).reshape(n_orders, n * size).T)
 
+    def block(self, count: int, rows: IntArray) -> ComplexArray:
+        """As in `DenseStiffness`."""
+        deviating = None if self.deviating is None else self.deviating[:count]
+        lowest = RingStiffness(self.waves[:count], self.seen[:count], self.pushed[:count], deviating)
+        return lowest.dense[:, rows[:, None], rows]
+
     def solve(self, places: slice | IntArray, force: ComplexArray) -> ComplexArray:
         """As in `DenseStiffness`."""
         waves, seen, pushed = self.waves[places], self.seen[places], self.pushed[places]
