@@ -13,8 +13,8 @@ equation for a small joint that opens and closes; else from integration in time 
 of a large joint).
 
 Disturbances of a travelling wave are those of m sectors (`disturbances`): all of a ring, where they are few or small,
-otherwise those of the nodal diameters 0 and d. A sector whose model has all nodal diameters, and few enough pairs, is
-tested in all sectors of its ring at one time (`ring_state`): other waves may grow beside the excited one.
+otherwise those of the nodal diameters 0 and d. A sector whose model has all nodal diameters is tested in all sectors of
+its ring at one time (`ring_state`), if these are not too many: other waves may grow beside the excited one.
 """
 
 import math
@@ -66,6 +66,10 @@ harmonics change means and first harmonics by up to 3 %. With 0.2 blocks, waves 
 MOST_ROWS = 600
 """Largest number of displacements of switching pairs in all sectors: 200 pairs take 0.4 GB and 10 s. Half and twice:
 ring and damper are equal."""
+
+LARGEST_RING = 1000
+"""Displacements that move, in all sectors of a ring, up to which its disturbances are integrated. With 820 (12 dovetail
+sectors of 16 pairs) 130 periods take 6 s, a sixth of the time of the sweep to the state; with 2000 one takes 1 s."""
 
 SCATTER = 0.035
 """Least error of growing multipliers of a large joint. Underplatform damper, nodal diameter 2, 274 Hz, where nearly all
@@ -148,6 +152,8 @@ def find_multipliers(case: Case, state: State, run: Run, *, growing_only: bool =
     most = MOST_ROWS // (3 * n_sectors)
     if np.count_nonzero(switching) > most:
         return Multipliers(nothing, np.inf, f"more than {most} pairs slip or open in a part of the period")
+    if isinstance(joint.model, RingModel) and _moving(joint, at) > LARGEST_RING:
+        return Multipliers(nothing, np.inf, f"more than {LARGEST_RING} displacements of the ring move")
     if not _bounces(joint, at):
         return _integrated(joint, at, case.settings.rtol, growing_only)
     sharp = _sharper(case, state, run)
@@ -213,8 +219,10 @@ def _sorted(values: ComplexArray) -> ComplexArray:
 def _integrated(joint: Joint, at: Evaluation, rtol: float, growing_only: bool) -> Multipliers:
     """Multipliers by integration in time; samples are doubled until the first one is known, or its side of 1."""
     sizes, rows = list[float](), 3 * np.count_nonzero(switching_pairs(at)[0])
-    if knows_ring(joint.model) and joint.model.n_sectors * rows <= MOST_ROWS:
-        joint, at = in_ring(joint, at)
+    if knows_ring(joint.model):
+        n_sectors = joint.model.n_sectors
+        if n_sectors * rows <= MOST_ROWS and n_sectors * _moving(joint, at) <= LARGEST_RING:
+            joint, at = in_ring(joint, at)
     n_sectors = _sectors(joint, at)
     every = n_sectors * _moving(joint, at) <= SMALL_JOINT
     n_samples = _samples(joint, at) // (1 if growing_only else 2)
