@@ -67,6 +67,8 @@ def march_sliders(
     """
     (n_samples, m), n, x, work, change = series_t.shape, limits.size, 0.0, 0.0, 0.0
     slow = SLOW_PERIODS if np.any(before_t != force_t) else 0
+    # the derivative repeats once all sliders that slip have slipped: a period after their places do
+    fewest = slow + 1 if m else slow
     x_t, by_t, sticks_t, by = np.zeros(n_samples), np.zeros((n_samples, m)), np.zeros((n_samples, n)), np.zeros((n, m))
     for period in range(slow + MOST_PERIODS):
         part, begun, work = min((period + 1.0) / (slow + 1.0), 1.0), at.copy(), 0.0
@@ -100,7 +102,7 @@ def march_sliders(
                     for k in range(m):
                         by[j, k] = by_x[k]
         change = np.abs(at - begun).max()
-        if period >= slow and change <= 0.1 * ROUND_OFF * limits[-1]:
+        if period >= fewest and change <= 0.1 * ROUND_OFF * limits[-1]:
             break
     return x_t, by_t, sticks_t, work, change
 

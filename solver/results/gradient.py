@@ -25,7 +25,8 @@ from solver.structure.condensation import build_structure
 @dataclass(frozen=True)
 class Gradient:
     """A scalar of a periodic state, and its derivatives along the state, at a constant tangential history of the pairs,
-    constant wear depths, and a constant penalty of the computation.
+    constant wear depths, and a constant penalty of the computation. Where a slider of Iwan's element has come to rest
+    at its limit, the derivative has two sides, and this is one of them.
 
     - value: amplitude of the first harmonic of a response, m, or wear rate of all pairs together, m3 per cycle.
     - by_frequency, by_excitation_amplitude: per Hz, per N.
