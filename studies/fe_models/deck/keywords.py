@@ -217,6 +217,9 @@ _INSTEAD = {
     "DAMPING": "remove it: the damping is loss_factor of the study",
     "EMBEDDEDELEMENT": "give *TIE, or meshes that share their nodes",
     "DISTRIBUTINGCOUPLING": "write *COUPLING with *DISTRIBUTING, of a surface of element faces",
+    **dict.fromkeys(
+        ("NGEN", "NFILL", "NCOPY", "ELGEN", "ELCOPY"), "write nodes and elements one by one, as a mesher does"
+    ),
     "PARAMETER": "write numbers in place of <names>",
     "PLASTIC": "remove it: materials are elastic",
     "PRE-TENSIONSECTION": "remove it, and give the force of the bolt with `preload` in the study",

@@ -1,17 +1,15 @@
-"""Keywords of the mesh: nodes, elements, sets, surfaces, parts and instances, and what makes nodes of others."""
+"""Keywords of the mesh: nodes, elements, sets, surfaces, parts and instances."""
 
 from dataclasses import replace
-from itertools import product
 
 import numpy as np
 
 from studies.fe_models.deck.contents import NODES_OF_KIND
-from studies.fe_models.deck.keywords import KEYWORDS, Block, Reference, Row, find_keyword, keyword, unit
+from studies.fe_models.deck.keywords import KEYWORDS, Block, Row, find_keyword, keyword, unit
 from studies.fe_models.deck.mesh import Draft, Records
-from studies.fe_models.deck.sets import NONE, Numbers, Resolver
-from studies.fe_models.files import LARGEST_NUMBER, FloatArray, IntArray, Place, is_integer, read_integer, shown
+from studies.fe_models.deck.sets import Numbers
+from studies.fe_models.files import LARGEST_NUMBER, FloatArray, IntArray, is_integer, read_integer, shown
 from studies.finite_element.cut_faces import turn_about
-from studies.finite_element.solid_mesh import find_places
 
 OTHER_KINDS = {
     "MASS": 1,
@@ -22,8 +20,6 @@ OTHER_KINDS = {
     **dict.fromkeys(("S8", "S8R", "CPS8", "CPE8", "CPS8R", "CPE8R", "M3D8", "M3D8R"), 8),
 }
 """Kinds of elements that are not read, and their numbers of nodes: without a section they carry nothing."""
-
-_MOST_MADE = 4_000_000  # nodes or elements that one keyword may make
 
 
 def read_mesh_keyword(draft: Draft, block: Block) -> None:
@@ -161,73 +157,6 @@ def _surface(draft: Draft, block: Block) -> None:
             raise row.place.wrong("a surface of nodes and of faces", "give two surfaces")
 
 
-@keyword("NGEN", "NSET LINE", of_mesh=True)
-def _ngen(draft: Draft, block: Block) -> None:
-    """First and last node, and the step of the numbers between them, on a straight line."""
-    if block.parameters.get("LINE", ""):
-        raise block.place.wrong(f"LINE={shown(block.parameters['LINE'])}", "give nodes on curves one by one")
-    for row in block.rows(2, "first and last node and the step of their numbers"):
-        first, last, step = _whole_numbers(row.fields, row.place, (0, 0, 1))
-        step = abs(step) if last > first else -abs(step)
-        if first == last or (last - first) % step:
-            raise row.place.wrong(f"from node {first} to {last} by {step}", "give a step that leads to the last node")
-        _fill(draft, block, row.place, (np.array([first]), np.array([last])), (last - first) // step, step)
-
-
-@keyword("NFILL", "NSET", of_mesh=True)
-def _nfill(draft: Draft, block: Block) -> None:
-    """Two sets of nodes, the number of intervals between them, and the step of the numbers."""
-    for row in block.rows(2, "two sets, the number of intervals and the step of the numbers"):
-        ends = _members(draft, row.reference(0)), _members(draft, row.reference(1))
-        _fill(draft, block, row.place, ends, *_whole_numbers(row.fields[2:], row.place, (1, 1)))
-
-
-def _fill(
-    draft: Draft, block: Block, place: Place, ends: tuple[IntArray, IntArray], n_intervals: int, step: int
-) -> None:
-    """Nodes between those of two sets, at equal distances on straight lines."""
-    first, last = ends
-    if len(first) != len(last) or n_intervals < 1 or n_intervals * len(first) > _MOST_MADE:
-        what = f"{n_intervals} intervals between {len(first)} and {len(last)} nodes"
-        raise place.wrong(what, f"give as many nodes at both ends, and at most {_MOST_MADE} between them")
-    numbers = (first[:, None] + step * np.arange(1, n_intervals)).ravel()
-    start, end = _coordinates(draft, block, first), _coordinates(draft, block, last)
-    share = np.linspace(0.0, 1.0, n_intervals + 1)[1:-1, None]
-    points = (start[:, None] + share * (end - start)[:, None]).reshape(-1, 3)
-    _add(draft, block, numbers, points, more=np.concatenate(ends))
-
-
-@keyword("NCOPY", "CHANGENUMBER OLDSET NEWSET SHIFT", of_mesh=True)
-def _ncopy(draft: Draft, block: Block) -> None:
-    """The nodes of a set again, with larger numbers, shifted and then turned about an axis."""
-    if "SHIFT" not in block.parameters:
-        raise block.place.wrong("a copy without SHIFT", "give the nodes of copies that are mirrored or scaled")
-    (change,) = _whole_numbers([block.parameters.get("CHANGENUMBER", "")], block.place, (0,))
-    numbers, (shift, turn) = _members(draft, block.reference("OLDSET")), _placement(block)
-    _add(draft, block, numbers + change, _coordinates(draft, block, numbers) @ turn.T + shift)
-
-
-@keyword("ELGEN", "ELSET", of_mesh=True)
-def _elgen(draft: Draft, block: Block) -> None:
-    """An element, and up to three times how many there are in a row with the steps of nodes and elements."""
-    for row in block.rows(2, "element, number in a row, step of nodes, step of elements"):
-        master, *rule = _whole_numbers(row.fields, row.place, (0, *(1, 1, 1) * 3))
-        counts, of_nodes, of_elements = rule[::3], rule[1::3], rule[2::3]
-        if np.prod([float(n) for n in counts]) > _MOST_MADE:
-            raise row.place.wrong(f"more than {_MOST_MADE} elements", "give smaller numbers")
-        steps = np.array(list(product(*(range(n) for n in counts))), dtype=np.int64).reshape(-1, 3)[1:]
-        _copy_elements(draft, block, np.array([master]), steps @ of_elements, steps @ of_nodes)
-
-
-@keyword("ELCOPY", "ELEMENTSHIFT SHIFTNODES OLDSET NEWSET", of_mesh=True)
-def _elcopy(draft: Draft, block: Block) -> None:
-    """The elements of a set again, with larger numbers of elements and nodes."""
-    given = [block.parameters.get(name, "") for name in ("ELEMENTSHIFT", "SHIFTNODES")]
-    by_element, by_node = (np.array(_whole_numbers([text], block.place, (0,))) for text in given)
-    own = _members(draft, block.reference("OLDSET"), of_elements=True)
-    _copy_elements(draft, block, own, by_element, by_node)
-
-
 def _placement(block: Block) -> tuple[FloatArray, FloatArray]:
     """Shift (3,) and turn (3, 3) of two data lines: a shift, and two points of an axis with an angle in degrees."""
     shift, turn = np.zeros(3), np.eye(3)
@@ -241,57 +170,12 @@ def _placement(block: Block) -> tuple[FloatArray, FloatArray]:
     return shift, turn
 
 
-def _whole_numbers(fields: list[str], place: Place, default: tuple[int, ...]) -> list[int]:
-    """Whole numbers, with defaults for those that are missing. Raises SceneError."""
-    values = list(default)
-    for at, text in enumerate(fields):
-        if at >= len(values) or (text and not (is_integer(text) and 0 < abs(int(text)) <= LARGEST_NUMBER)):
-            raise place.wrong(f"{shown(text)!r} in place of a number", f"give {len(values)} whole ones, none of them 0")
-        values[at] = int(text) if text else values[at]
-    return values
-
-
-def _members(draft: Draft, reference: Reference, *, of_elements: bool = False) -> IntArray:
-    """Nodes, or elements, (m,) of a set of the same scope by number, as far as the deck is read. Raises SceneError."""
-    records, sets = (draft.elements, draft.element_sets) if of_elements else (draft.nodes, draft.node_sets)
-    if (reference.scope, reference.target) in sets.unsorted and not of_elements:
-        raise reference.place.wrong(f"the set {reference.target} is UNSORTED", "give sets by ascending numbers here")
-    known = np.concatenate([NONE, *(each.numbers for each in records if each.scope == reference.scope)])
-    return Resolver(sets, np.unique(known), {reference.scope: 0})(reference)
-
-
-def _coordinates(draft: Draft, block: Block, wanted: IntArray) -> FloatArray:
-    """Coordinates (m, 3) of nodes by their numbers (m,). Raises SceneError where one does not exist."""
-    own = [each for each in draft.nodes if each.scope == block.scope]
-    places = find_places(wanted, np.concatenate([NONE, *(each.numbers for each in own)]))
-    if (places < 0).any():
-        raise block.place.wrong(f"there is no node {wanted[places < 0].min()}", "define it above this line")
-    return np.concatenate([each.values for each in own])[places]
-
-
-def _add(
-    draft: Draft, block: Block, numbers: IntArray, values: FloatArray | IntArray, kind: str = "", more: IntArray = NONE
-) -> None:
-    """Nodes, or elements, which have a kind; the set that a parameter names has them, and `more`."""
+def _add(draft: Draft, block: Block, numbers: IntArray, values: FloatArray | IntArray, kind: str = "") -> None:
+    """Nodes, or elements, which have a kind; the set that a parameter names has them."""
     whole = np.append(numbers, values) if kind else numbers
     if whole.size and not 0 < whole.min() <= whole.max() <= LARGEST_NUMBER:
         raise block.place.wrong(f"numbers beyond 1 to {LARGEST_NUMBER}", "give smaller steps")
     records, sets = (draft.elements, draft.element_sets) if kind else (draft.nodes, draft.node_sets)
     records.append(Records(block.scope, numbers, values, block.place, kind))
-    for parameter in block.parameters.keys() & {"NSET", "ELSET", "NEWSET"}:
-        sets.add((block.scope, block.name(parameter)), Numbers(block.scope, np.concatenate([numbers, more])))
-
-
-def _copy_elements(draft: Draft, block: Block, own: IntArray, by_element: IntArray, by_node: IntArray) -> None:
-    """Elements with numbers and nodes shifted by steps (m,), (m,), once for each step."""
-    if own.size * by_element.size > _MOST_MADE:
-        raise block.place.wrong(f"more than {_MOST_MADE} elements", "give smaller numbers")
-    done = 0
-    for each in [each for each in draft.elements if each.scope == block.scope]:
-        rows = np.flatnonzero(np.isin(each.numbers, own))
-        numbers = (each.numbers[rows] + by_element[:, None]).ravel()
-        nodes = (each.values[rows] + by_node[:, None, None]).reshape(-1, each.values.shape[1]).astype(np.int64)
-        _add(draft, block, numbers, nodes, each.kind, each.numbers[rows])
-        done += rows.size
-    if done < own.size or not own.size:
-        raise block.place.wrong("an element that does not exist", "define it above this line")
+    for parameter in block.parameters.keys() & {"NSET", "ELSET"}:
+        sets.add((block.scope, block.name(parameter)), Numbers(block.scope, numbers))

@@ -179,7 +179,7 @@ WRONG = [
     *((f"*INCLUDE,INPUT={name}\n", "1: *INCLUDE") for name in ("deck.inp", "none.inp", "../../etc/passwd")),
     # what is not read and may change the model
     (BLOCKS + "*CONTACT\n", "110: *CONTACT"),
-    (BLOCKS + "*NONSENSE\n", "110: *NONSENSE"),
+    *((f"{BLOCKS}*{word}\n", f"110: *{word}") for word in ("NONSENSE", "NGEN", "ELCOPY")),
     (BLOCKS + "*COUPLING, REF NODE=5, SURFACE=SUP\n", "110: *COUPLING"),
     (BLOCKS + "*DISTRIBUTING COUPLING, ELSET=E\n", "110: *DISTRIBUTING COUPLING"),
     (BLOCKS + "*INITIAL CONDITIONS, TYPE=STRESS\n", "110: *INITIAL CONDITIONS"),

@@ -136,37 +136,6 @@ CELLS = "*ELEMENT, TYPE=C3D8, ELSET=E\n" + "".join(
     ", ".join(map(str, (n, *(x + 3 * y + 9 * z + corner for corner in CORNERS)))) + "\n"
     for n, (z, y, x) in enumerate(product(range(2), repeat=3), 1)
 )
-MADE_NODES = """\
-*NODE
-1, 0, 0, 0
-3, 2, 0, 0
-7, 0, 4, 0
-9, 2, 4, 0
-*NGEN, NSET=R1
-1, 3
-*NGEN, NSET=R3
-9, 7, -1
-*NFILL, NSET=L1
-R1, R3, 2, 3
-*NCOPY, CHANGE NUMBER=18, OLD SET=L1, NEW SET=L3, SHIFT
-0, 0, 1.
-*NFILL, NSET=N
-L1, L3, 2, 9
-*ELEMENT, TYPE=C3D8, ELSET=E
-1, 1, 2, 5, 4, 10, 11, 14, 13
-"""
-ALL_OF_THEM = "*ELGEN, ELSET=E\n1, 2, 1, 1, 2, 3, 2, 2, 9, 4\n"
-COPIED = "*ELGEN, ELSET=E\n1, 2, 1, 1, 2, 3, 2\n*ELCOPY, ELEMENT SHIFT=4, OLD SET=E, SHIFT NODES=9, NEW SET=E\n"
-
-
-@pytest.mark.parametrize("made", [ALL_OF_THEM, COPIED], ids=["ELGEN", "ELCOPY"])
-def test_nodes_and_elements_of_others(made, tmp_path):
-    whole, deck = (read_deck(write(tmp_path, text)) for text in (GRID + CELLS, MADE_NODES + made))
-    assert deck.node_numbers.tolist() == whole.node_numbers.tolist()
-    np.testing.assert_allclose(deck.coordinates, whole.coordinates, atol=1e-12)
-    np.testing.assert_array_equal(deck.blocks[0].nodes, whole.blocks[0].nodes)
-    assert deck.element_sets["E"].tolist() == [*range(1, 9)]
-    assert deck.node_sets["N"].tolist() == [*range(1, 28)]
 
 
 def test_coordinates_of_a_system(tmp_path):
