@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from studies.fe_models.deck.contents import NODES_OF_KIND
-from studies.fe_models.deck.keywords import KEYWORDS, Block, Row, find_keyword, keyword, unit
+from studies.fe_models.deck.keywords import HARMLESS, KEYWORDS, Block, Row, find_keyword, keyword, unit
 from studies.fe_models.deck.mesh import Draft, Records
 from studies.fe_models.deck.sets import Numbers
 from studies.fe_models.files import LARGEST_NUMBER, FloatArray, IntArray, is_integer, read_integer, shown
@@ -27,7 +27,8 @@ def read_mesh_keyword(draft: Draft, block: Block) -> None:
     block = replace(block, scope=draft.scope)
     if draft.part and block.keyword not in ("PART", "ENDPART", "INSTANCE", "ENDINSTANCE"):
         draft.parts[draft.part].append(block)
-    elif block.keyword in KEYWORDS and KEYWORDS[block.keyword].of_mesh:
+    elif block.keyword not in HARMLESS and (block.keyword not in KEYWORDS or KEYWORDS[block.keyword].of_mesh):
+        # what is not read is refused before anything lacks the nodes that it would make
         find_keyword(block).reader(draft, block)
     else:
         draft.others.append(block)

@@ -179,7 +179,8 @@ WRONG = [
     *((f"*INCLUDE,INPUT={name}\n", "1: *INCLUDE") for name in ("deck.inp", "none.inp", "../../etc/passwd")),
     # what is not read and may change the model
     (BLOCKS + "*CONTACT\n", "110: *CONTACT"),
-    *((f"{BLOCKS}*{word}\n", f"110: *{word}") for word in ("NONSENSE", "NGEN", "ELCOPY")),
+    *((f"{BLOCKS}*{word}\n", f"110: *{word}") for word in ("NONSENSE", "ELCOPY")),
+    ("*NODE\n1,0,0,0\n*NGEN\n1,4\n*ELEMENT,TYPE=C3D4\n1,1,2,3,4\n", "3: *NGEN"),
     (BLOCKS + "*COUPLING, REF NODE=5, SURFACE=SUP\n", "110: *COUPLING"),
     (BLOCKS + "*DISTRIBUTING COUPLING, ELSET=E\n", "110: *DISTRIBUTING COUPLING"),
     (BLOCKS + "*INITIAL CONDITIONS, TYPE=STRESS\n", "110: *INITIAL CONDITIONS"),
