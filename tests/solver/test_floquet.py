@@ -10,12 +10,8 @@ import pytest
 
 from solver import frequency_response
 from solver import march_wear as worn_model
-from solver.continuation.first_state import state_at_rest
-from solver.continuation.transient import relax_to_periodic
 from solver.harmonic_balance.dlft import Balance
-from solver.harmonic_balance.state import State
 from solver.loading_history import start_states
-from solver.newton.linear_solver import JacobianSolver
 from solver.newton.run import Run
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
@@ -147,20 +143,6 @@ def test_a_stability_that_is_not_known_is_said(monkeypatch):
         assert outcome is Outcome.INACCURATE
         assert "stable is not known: more than 0 pairs" in message
     assert np.isfinite(history.worn_volume).all()
-
-
-def test_a_state_is_unstable_only_where_it_is_so_with_many_samples(monkeypatch):
-    def sign(_, tangent):
-        return 1.0 if tangent.joint.basis.n_samples > 512 else -1.0
-
-    monkeypatch.setattr(JacobianSolver, "determinant_sign", sign)
-    model, settings = bundled("vibro_impact"), SolverSettings(5, 64)
-    case = case_of(model, 0.0, 1.2, settings)
-    first_point(case, 1.2, 0.02)
-    rest, joint = state_at_rest(case, 1.2, Run(settings.tolerance)), case.joint(1.2, 0.02)
-    assert isinstance(
-        relax_to_periodic(joint, np.zeros((2, 1)), rest, case.joint(1.2, 0.0), Run(settings.tolerance)), State
-    )
 
 
 def test_multipliers_of_many_harmonics_have_samples_enough(monkeypatch):

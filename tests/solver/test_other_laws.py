@@ -12,6 +12,7 @@ from scipy.special import ellipk
 from solver import CubicSprings, IwanJoints, SolverSettings, backbone, build_model, frequency_response
 from solver.compliant_contact import with_contact_stiffness
 from solver.contact.iwan import SLIDERS
+from solver.harmonic_balance.state import state_of
 from solver.newton.run import Run
 from solver.settings import Resolution
 from solver.stability.floquet import find_multipliers
@@ -63,6 +64,32 @@ def test_derivatives_of_a_joint_with_all_laws_are_differences(comes_from):
     tangent = balance.linearise(at).dense(np.arange(4))
     differences = jacobian_by_differences(balance, predicted, 1e-4)
     assert (np.abs(tangent - differences).max(axis=1) < 1e-7 * np.abs(differences).max(axis=1)).all()
+
+
+def test_a_law_that_remembers_more_leaves_what_friction_remembers():
+    model = with_all_laws()
+    balance, predicted = random_balance(model, SolverSettings(5, 64), 104, wear=False)
+    both = replace(balance, history=np.pad(balance.history, ((0, 0), (0, balance.joint.law.n_history - 2))))
+    contact = replace(model.contact, laws=(model.contact.laws[0], CubicSprings((2,), 1e6, 0.0)))
+    short, _ = random_balance(replace(model, contact=contact), SolverSettings(5, 64), 104, wear=False)
+    left, expected = (state_of(each.joint, each.evaluate(predicted)).next_history for each in (both, short))
+    assert left.shape[1] == 2 * SLIDERS and left[2, 2:].any()
+    assert np.array_equal(left[[1, 3], :2], expected[[1, 3]])
+    assert not left[[1, 3], 2:].any()
+
+
+@pytest.mark.parametrize("pairs", [(1, 0), (0, 0), (0, 4), (-1,)])
+def test_pairs_of_a_law_have_to_be_there_in_order(pairs):
+    contact = with_all_laws().contact
+    with pytest.raises(ValueError, match="laws"):
+        replace(contact, laws=(CubicSprings(pairs, 1e6, 0.0),))
+
+
+def test_a_joint_at_rest_needs_one_harmonic():
+    # it would be refined for ever
+    response = frequency_response(duffing(), [16.0], 0.0, 0.4, settings=SolverSettings(time_limit=2.0))
+    assert response.outcome[0].meaning == "converged"
+    assert np.abs(response.response).max() < 1e-15
 
 
 # --- springs ---
