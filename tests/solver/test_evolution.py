@@ -68,6 +68,8 @@ def test_friction_that_rises_with_the_energy_is_exponential_in_the_cycles():
     exact = first * np.expm1(slope * PER_CYCLE * counts) / slope
     assert found.dissipated_energy[:, 0] == pytest.approx(exact, rel=1e-4)
     assert (np.abs(found.dissipated_energy[:, 0] - exact) <= found.dissipated_energy_error[:, 0]).all()
+    of_loops = found.friction_power[:, 0] * 2.0 * np.pi / omega
+    assert of_loops == pytest.approx(PER_CYCLE * (first + slope * exact), rel=1e-3)
     assert found.outcome is Outcome.CONVERGED
 
 
@@ -88,32 +90,7 @@ def saturates():
 EXACT = np.array([brentq(lambda e, n=n: counts_of(e) - n, 0.0, 1e8) for n in COUNTS[1:]])
 
 
-def test_friction_that_saturates_follows_its_closed_form():
-    found = history(*saturates())
-    assert found.dissipated_energy[1:, 0] == pytest.approx(EXACT, rel=1e-4)
-    assert (np.abs(found.dissipated_energy[1:, 0] - EXACT) <= found.dissipated_energy_error[1:, 0]).all()
-
-
-TI_CYCLES = np.array([0.0, 12.0, 118.0, 498.0, 1001.0, 2002.0, 2998.0, 3999.0, 4310.0])
-TI_FRICTION = np.array([0.102, 0.102, 0.116, 0.121, 0.126, 0.142, 0.201, 0.277, 0.328])
-"""Friction of Ti-6Al-4V on itself over cycles, measured (Fouvry and others, Wear 2017)."""
-
-
-def test_measured_friction_in_gives_the_measured_loops():
-    # linear over the energy, friction is exponential in the cycles between two measurements; before the first it rests
-    ratio = np.log(TI_FRICTION[1:] / TI_FRICTION[:-1])
-    mean = np.divide(np.diff(TI_FRICTION), ratio, out=TI_FRICTION[1:].copy(), where=ratio > 0.0)
-    energy = PER_CYCLE * np.concatenate([[0.0], np.cumsum(np.diff(TI_CYCLES) * mean)])
-    model, omega = driven(energy, friction_coefficient=TI_FRICTION)
-    # nothing wears, and before the first measurement nothing changes either
-    found = history(model, omega, counts=TI_CYCLES, wear=0.0)
-    loops = found.friction_power[:, 0] * 2.0 * np.pi / omega
-    assert loops == pytest.approx(PER_CYCLE * TI_FRICTION, rel=1e-3)
-    assert found.dissipated_energy[:, 0] == pytest.approx(energy, rel=1e-3)
-    assert (np.abs(found.dissipated_energy[:, 0] - energy) <= found.dissipated_energy_error[:, 0]).all()
-
-
-def test_adaptive_steps_are_of_second_order(monkeypatch):
+def test_friction_that_saturates_follows_its_closed_form_with_steps_of_second_order(monkeypatch):
     off, steps, step = [], [], WearProblem.step
     monkeypatch.setattr(WearProblem, "step", lambda of, state: (seen.append(of.guide), step(of, state))[1])
     for rtol in (1e-2, 1e-3):
@@ -122,12 +99,14 @@ def test_adaptive_steps_are_of_second_order(monkeypatch):
         off.append(np.abs(found.dissipated_energy[1:, 0] / EXACT - 1.0).max())
         # without those of the reference solution, which has a guide
         steps.append(seen.count(None))
+    assert off[1] < 1e-4
+    assert (np.abs(found.dissipated_energy[1:, 0] - EXACT) <= found.dissipated_energy_error[1:, 0]).all()
     assert np.log(off[0] / off[1]) / np.log(steps[1] / steps[0]) > 1.7
 
 
 @pytest.mark.parametrize("scheme", ["implicit", "explicit"])
 def test_given_steps_are_of_first_order_and_know_their_error(scheme):
-    found = [history(*saturates(), steps=(scheme, step)) for step in (4000.0, 2000.0)]
+    found = [history(*saturates(), steps=(scheme, step)) for step in (10_000.0, 5000.0)]
     off, other = (np.abs(each.dissipated_energy[1:, 0] - EXACT) for each in found)
     assert off / other == pytest.approx(2.0, rel=0.1)
     assert (off <= found[0].dissipated_energy_error[1:, 0]).all()
@@ -146,32 +125,18 @@ def test_a_contact_that_changes_faster_than_the_vibration_follows_is_said(energy
     assert ("periods to follow a change of the contact" in found.message) == lags
 
 
-def with_rule(model, friction):
-    """The model with constant tables."""
-    return with_evolution(model, [0.0, 1e6, 3e6], friction_coefficient=3 * [friction], wear_factor=3 * [1.0])
-
-
 @pytest.mark.parametrize("name", ["sdof_slider", "dovetail"])
-def test_a_constant_table_gives_the_same_bits_as_the_constant(name):
+def test_constant_tables_give_the_same_bits_as_the_constants(name):
     model, frequency, load, counts = (
-        (dovetail(5), 212.5, 0.5, COUNTS[:5]) if name == "dovetail" else (scene(name, 5), 160.0, 10.0, COUNTS)
+        (dovetail(5), 212.5, 0.5, COUNTS[:3]) if name == "dovetail" else (scene(name, 5), 160.0, 10.0, COUNTS)
     )
     asked = {"wear": 1.1e-11, "counts": counts, "load": load, "settings": SolverSettings(harmonics=5, samples=64)}
-    plain = history(model, 2.0 * np.pi * frequency, 0.5, **asked)
-    ruled = history(with_rule(model, 0.5), 2.0 * np.pi * frequency, **asked)
+    tables = {"friction_coefficient": 3 * [0.5], "wear_factor": 3 * [1.0], "contact_stiffness": 3 * [2e13]}
+    plain = history(with_contact_stiffness(model, 2e13), 2.0 * np.pi * frequency, 0.5, **asked)
+    ruled = history(with_evolution(model, [0.0, 1e6, 3e6], **tables), 2.0 * np.pi * frequency, **asked)
     assert plain.worn_volume[-1] > 0.0
     for name in ("wear_depth", "dissipated_energy", "wear_depth_error", "response", "newton_iterations"):
         np.testing.assert_array_equal(getattr(ruled, name), getattr(plain, name))
-
-
-def test_a_constant_stiffness_is_that_of_the_scene():
-    model = dovetail(5)
-    asked = {"wear": 1.1e-11, "counts": COUNTS[:3], "load": 0.5, "settings": SolverSettings(harmonics=5, samples=64)}
-    plain = history(with_contact_stiffness(model, 1e14), 2.0 * np.pi * 212.5, 0.5, **asked)
-    ruled = history(
-        with_evolution(model, [0.0, 1e6], contact_stiffness=[1e14, 1e14]), 2.0 * np.pi * 212.5, 0.5, **asked
-    )
-    np.testing.assert_array_equal(ruled.wear_depth, plain.wear_depth)
 
 
 def test_a_wear_coefficient_over_energy_is_one_over_depth():
@@ -181,12 +146,12 @@ def test_a_wear_coefficient_over_energy_is_one_over_depth():
     rising = np.exp(per_depth * coefficient * energy)
     deepest = (rising[-1] - 1.0) / per_depth
     over_depth = WearLaw("table", table=WearTable((0.0,), (0.0, deepest), ((0.5, 0.5 * rising[-1]),)))
-    asked = {"wear": coefficient, "load": 10.0, "settings": SolverSettings(harmonics=5, samples=64, rtol=1e-4)}
+    asked = {"wear": coefficient, "load": 10.0, "settings": SolverSettings(harmonics=5, samples=64)}
     one = history(scene("sdof_slider", 5), omega, 0.5, law=over_depth, **asked)
     model = with_evolution(scene("sdof_slider", 5), energy, wear_factor=rising)
     other = history(model, omega, 0.5, law=WearLaw("energy"), **asked)
     assert one.wear_depth[-1, 0] * per_depth > 0.05
-    assert other.wear_depth == pytest.approx(one.wear_depth, rel=2e-4)
+    assert other.wear_depth == pytest.approx(one.wear_depth, rel=2e-3)
 
 
 def test_a_slider_wears_as_cycle_by_cycle_with_its_exact_motion():
