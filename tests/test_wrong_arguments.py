@@ -9,8 +9,10 @@ import numpy as np
 import pytest
 
 import fretwear
-from fretwear import SceneError, SolverSettings, UserError
+from fretwear import Block, Passage, SceneError, SolverSettings, UserError
+from solver import CubicSprings, IwanJoints
 from solver.contact.wear_law import WearLaw, WearTable
+from solver.settings import WearTarget
 
 SLIDER = fretwear.build_scene("sdof_slider")
 ROUGH = replace(SLIDER, contact=replace(SLIDER.contact, friction_coefficient=np.array([0.4])))
@@ -24,7 +26,19 @@ CURVE = JOINT | {"frequency": (0.2, 0.25)}
 STUDY = {"study": "sdof_slider"}
 SCENE = partial(fretwear.build_scene, "sdof_slider")
 FEW = SolverSettings(harmonics=5, samples=8)
+CRUISE = Block(SLIDER, 160.0, 10.0, 0.5, 200.0, "continue", "cruise")
+MISSIONS = partial(fretwear.integrate_mission, wear_coefficient=1e-11, missions=10)
+EVOLVE = partial(fretwear.with_evolution, energy=[0.0, 1.0])
+EVOLVED = EVOLVE(SLIDER, wear_factor=[1.0, 2.0])
 BY_DEPTH = WearLaw("table", table=WearTable((0.0, 1e6), (0.0, 1e-5), ((1.0, 1.0), (1.0, 1.0))))
+
+
+def second_block(**changed):
+    """What is said of one of two blocks, without its number and name."""
+    with pytest.raises(ValueError, match=r"^blocks\[[01]\].*?: ") as caught:
+        fretwear.integrate_mission((CRUISE, replace(CRUISE, name="", **changed)), 1e-11, 10)
+    raise ValueError(str(caught.value).partition(": ")[2])
+
 
 # a function with what is right, and for each name what is wrong; "->": what the line begins with, where it is another
 WRONG = [
@@ -102,6 +116,22 @@ WRONG = [
     (lambda name: fretwear.build_scene(name), {}, {"name -> model": ("nothing",)}),
     (SCENE, {}, {"friction_coefficient": (0.3,), "mas": (1.0,), "mass": (-1.0, "1")}),
     (fretwear.read_scene, {}, {"path -> model": (Path(__file__),)}),
+    (partial(CubicSprings, (0, 1)), {"linear": 1.0, "cubic": 0.0}, {"linear": ([1.0, -1.0],), "cubic": ([0.0],)}),
+    (partial(IwanJoints, (0,), normal_stiffness=0.0), {"stiffness": 1.0, "limit": 1.0}, {"limit": (0.0,)}),
+    (partial(IwanJoints, (0,), normal_stiffness=0.0), {"limit": 1.0}, {"stiffness": (np.inf,)}),
+    (EVOLVE, {"wear_factor": [1.0, 2.0]}, {"model -> evolution": (EVOLVED,)}),
+    (EVOLVE, {"model": SLIDER, "wear_factor": [1.0, 2.0]}, {"energy": ([1.0, 2.0], [0.0], [0.0, 0.0])}),
+    (EVOLVE, {"model": SLIDER}, {"friction_coefficient": ([0.3, 2.5],), "contact_stiffness": ([2e13, 1e13],)}),
+    (EVOLVE, {"model": SLIDER}, {"wear_factor": ([1.0, np.inf], [1.0, 2.0, 3.0]), "wear_factor -> evolution": (None,)}),
+    (MISSIONS, {"blocks": (CRUISE,)}, {"missions": ([1.5], 0), "blocks": ((),), "largest_step": (1.5,)}),
+    (MISSIONS, {"blocks": (CRUISE,)}, {"until": (WearTarget("frequency_shift", 0.1),), "sweep": ("continue",)}),
+    (second_block, {}, {"begin": ("sweep",), "cycles": (0.0, None), "frequency": (np.nan,)}),
+    (second_block, {}, {"friction_coefficient": ([0.1, 0.2],), "friction_coefficient -> begin": (0.4,)}),
+    (second_block, {}, {"excitation_amplitude": (0.0,), "model": (SCENE(area=2e-4),)}),
+    (second_block, {"frequency": Passage(2.0, 3.0, 1.0)}, {"cycles": (1.0,)}),
+    (second_block, {"frequency": Passage(2.0, 3.0, 1.0), "cycles": None}, {"begin": ("down",)}),
+    (second_block, {"cycles": None}, {"frequency -> frequency.stop": (Passage(2.0, 2.0, 1.0),)}),
+    (second_block, {"cycles": None}, {"frequency -> frequency.rate": (Passage(2.0, 3.0, -1.0),)}),
 ]
 
 

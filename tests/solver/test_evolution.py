@@ -287,21 +287,3 @@ def test_the_slope_of_a_wear_rate_has_its_factor():
         wearing = WearingJoint(case, start, WearRequest(1e-11, None, COUNTS))
         slopes.append(float(rate_slope(wearing, wearing.unworn_state(), np.ones(1, bool))[0, 0]))
     assert slopes[0] == pytest.approx(3.0 * slopes[1], rel=1e-9)
-
-
-def test_what_cannot_evolve_is_refused():
-    model = scene("sdof_slider", 3)
-    for tables, name in (
-        ({}, "evolution"),
-        ({"wear_factor": [1.0, np.inf]}, "wear_factor"),
-        ({"friction_coefficient": [0.3, 2.5]}, "friction_coefficient"),
-        ({"contact_stiffness": [2e13, 1e13]}, "contact_stiffness"),
-        ({"wear_factor": [1.0, 2.0, 3.0]}, "wear_factor"),
-    ):
-        with pytest.raises(ValueError, match=name):
-            with_evolution(model, [0.0, 1.0], **tables)
-    for energy in ([1.0, 2.0], [0.0], [0.0, 0.0]):
-        with pytest.raises(ValueError, match="energy"):
-            with_evolution(model, energy, wear_factor=[1.0] * len(energy))
-    with pytest.raises(ValueError, match="already"):
-        with_evolution(with_evolution(model, [0.0, 1.0], wear_factor=[1.0, 2.0]), [0.0, 1.0], wear_factor=[1.0, 2.0])

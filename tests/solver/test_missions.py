@@ -340,35 +340,6 @@ def test_a_reference_solution_that_fails_leaves_the_error_unknown(monkeypatch):
     assert history.outcome is Outcome.INACCURATE
 
 
-def test_what_is_wrong_of_a_block_is_named():
-    one, other = two_blocks()
-    passage = {"frequency": Passage(2.0, 3.0, 1.0), "cycles": None}
-    for changed, key in (
-        ({"begin": "sweep"}, "begin"),
-        ({"cycles": 0.0}, "cycles"),
-        ({"cycles": None}, "cycles"),
-        ({**passage, "frequency": Passage(2.0, 2.0, 1.0)}, "frequency.stop"),
-        ({**passage, "frequency": Passage(2.0, 3.0, -1.0)}, "frequency.rate"),
-        ({**passage, "cycles": 1.0}, "cycles"),
-        ({**passage, "begin": "down"}, "begin"),
-        ({"frequency": np.nan}, "frequency"),
-        ({"excitation_amplitude": 0.0}, "excitation_amplitude"),
-        ({"friction_coefficient": [0.1, 0.2]}, "friction_coefficient"),
-        ({"friction_coefficient": 0.4}, "begin"),
-        ({"model": scene("sdof_slider", area=2e-4)}, "model"),
-    ):
-        with pytest.raises(ValueError, match=rf"blocks\[[01]\].*: {key}"):
-            integrate((one, replace(other, **changed)), 10)
-
-
-def test_what_is_wrong_of_a_mission_is_named():
-    target = WearTarget("frequency_shift", 0.1)
-    wrong = ("missions", [1.5]), ("missions", 0), ("blocks", ()), ("largest_step", 1.5), ("until", target)
-    for key, value in (*wrong, ("sweep", "continue")):
-        with pytest.raises(ValueError, match=key):
-            integrate(**{"blocks": two_blocks(), "missions": 10, key: value})
-
-
 def test_a_block_without_a_start_state_is_an_outcome():
     """The time is over before the first state."""
     history = integrate_mission(two_blocks("up"), WEAR, 10, settings=replace(SETTINGS, time_limit=0.0))

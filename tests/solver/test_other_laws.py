@@ -73,7 +73,8 @@ def test_a_law_that_remembers_more_leaves_what_friction_remembers():
     contact = replace(model.contact, laws=(model.contact.laws[0], CubicSprings((2,), 1e6, 0.0)))
     short, _ = random_balance(replace(model, contact=contact), SolverSettings(5, 64), 104, wear=False)
     left, expected = (state_of(each.joint, each.evaluate(predicted)).next_history for each in (both, short))
-    assert left.shape[1] == 2 * SLIDERS and left[2, 2:].any()
+    assert left.shape[1] == 2 * SLIDERS
+    assert left[2, 2:].any()
     assert np.array_equal(left[[1, 3], :2], expected[[1, 3]])
     assert not left[[1, 3], 2:].any()
 
@@ -266,17 +267,3 @@ def test_rough_surfaces_are_those_of_pairs_that_rub():
     rough = with_contact_stiffness(with_all_laws(), 1e13)
     n_rubbing = np.count_nonzero(with_all_laws().contact.dofs[[1, 3]] >= 0)
     assert len(rough.linear[0].mass) == len(with_all_laws().linear[0].mass) + n_rubbing
-
-
-@pytest.mark.parametrize(
-    ("law", "said"),
-    [
-        (lambda: CubicSprings((0, 1), [1.0, -1.0, 0.0], 0.0), "linear"),
-        (lambda: CubicSprings((0, 1), 1.0, np.zeros((3, 3))), "cubic"),
-        (lambda: IwanJoints((0,), 1.0, 0.0, 0.0), "limit"),
-        (lambda: IwanJoints((0,), np.inf, 1.0, 0.0), "stiffness"),
-    ],
-)
-def test_impossible_numbers_of_a_law_are_named(law, said):
-    with pytest.raises(ValueError, match=f"^{said}: give"):
-        law()
