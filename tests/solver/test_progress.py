@@ -1,7 +1,5 @@
 """Lines about how far a computation is."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 
@@ -32,33 +30,25 @@ def test_long_work_says_where_it_is(lines):
     blocks = [Block(scene("sdof_slider", damping=10.0), 160.0, 10.0, 0.5, 100.0)]
     integrate_mission(blocks, 1e-12, 2, progress=lines.append)
     assert {"mission 1", "mission 2"} <= set(lines)
-
-
-def _append(told, *said):
-    told.append(said)
-
-
-def test_a_history_says_how_far_its_solutions_are():
-    """Of one to a target: by the wear where this comes before the last count."""
-    model = with_friction(scene("sdof_slider"), 0.5)
-    _, start = next(FrequencySweep(model, 10.0, "up", SolverSettings()).states(np.array([160.0])))
-    for until in (None, WearTarget("wear_depth", 1e-6)):
-        told = list[tuple[str, int, float]]()
-        request = WearRequest(1e-11, None, np.linspace(0.0, 1e5, 3), until=until)
-        report = partial(_append, told)
-        next(integrate_together(model, SolverSettings(), start, [request], report=report))
-        numbers, shares = [number for _, number, _ in told], [number + share for _, number, share in told]
-        assert set(numbers) == {0, 1}
-        assert shares == sorted(shares)
-        assert shares[0] < 0.1
-        assert shares[-1] == 2.0
-        assert told[-1][0].startswith("reference solution, cycle ")
-        assert max(share for _, number, share in told if number == 0) == 1.0
-
-
-def test_a_mode_says_where_it_is(lines):
-    backbone(scene("sdof_slider"), np.array([3e-3]), 0.5, sweep="down", progress=lines.append)
+    lines.clear()
+    backbone(model, np.array([3e-3]), 0.5, sweep="down", progress=lines.append)
     assert lines
+
+
+@pytest.mark.parametrize("until", [None, WearTarget("wear_depth", 1e-6)])
+def test_a_history_says_how_far_its_solutions_are(until):
+    """Of one to a target: by the wear where this comes before the last count."""
+    model, told = with_friction(scene("sdof_slider"), 0.5), list[tuple[str, int, float]]()
+    _, start = next(FrequencySweep(model, 10.0, "up", SolverSettings()).states(np.array([160.0])))
+    request = WearRequest(1e-11, None, np.linspace(0.0, 1e5, 3), until=until)
+    next(integrate_together(model, SolverSettings(), start, [request], report=lambda *said: told.append(said)))
+    numbers, shares = [number for _, number, _ in told], [number + share for _, number, share in told]
+    assert set(numbers) == {0, 1}
+    assert shares == sorted(shares)
+    assert shares[0] < 0.1
+    assert shares[-1] == 2.0
+    assert told[-1][0].startswith("reference solution, cycle ")
+    assert max(share for _, number, share in told if number == 0) == 1.0
 
 
 def test_there_is_no_line_where_nobody_waits():

@@ -278,20 +278,16 @@ def test_the_error_is_told_near_where_slip_begins(frequency, settings):
     assert 0.7 * true < told < 4.0 * true
 
 
-def test_a_reference_sweep_that_is_lost_leaves_the_error_unknown(monkeypatch):
+@pytest.mark.parametrize("lost", ["reference", "sweep"])
+def test_a_state_whose_reference_sweep_is_lost_or_that_is_found_from_rest_has_an_unknown_error(lost, monkeypatch):
+    """From rest the friction has another history than that of a sweep."""
     follow = sweep_module.follow
 
-    def lost(path, states, targets, *more, **named):
+    def reference_lost(path, states, targets, *more, **named):
         return () if targets[-1] < 2.0 * np.pi * 212.42 else follow(path, states, targets, *more, **named)
 
-    monkeypatch.setattr(sweep_module, "follow", lost)
-    start = starts([212.5])[212.5]
-    assert (start.outcome, start.wear_rate_error, start.reference) == (Outcome.INACCURATE, np.inf, None)
-
-
-def test_a_state_to_which_no_sweep_leads_has_an_unknown_error(monkeypatch):
-    """Found from rest: its friction has another history than that of a sweep."""
-    monkeypatch.setattr(sweep_module, "SWEEP_ITERATIONS", 0)
+    name, other = ("follow", reference_lost) if lost == "reference" else ("SWEEP_ITERATIONS", 0)
+    monkeypatch.setattr(sweep_module, name, other)
     start = starts([212.5])[212.5]
     assert start.state is not None
     assert (start.outcome, start.wear_rate_error, start.reference) == (Outcome.INACCURATE, np.inf, None)

@@ -205,8 +205,7 @@ def assert_goes_on(study, expected, solver, fault, capsys):
     xr.testing.assert_identical(results(), expected)
 
 
-@pytest.mark.parametrize("fault", FAULTS)
-@pytest.mark.parametrize("kind", [Sweep, History])
+@pytest.mark.parametrize(("kind", "fault"), list(zip(2 * [Sweep, History], FAULTS, strict=True)))
 def test_a_run_that_a_fault_of_the_machine_has_ended_goes_on(kind, fault, solver, capsys):
     expected = whole(solver, SMALL)
 
