@@ -238,7 +238,8 @@ class FiniteElements(SceneSource):
 
     @cached_property
     def offers(self) -> tuple[str, ...]:
-        return super().offers if self.held else ("mesh",) * self._files.has_faces
+        # a table of nodes has no faces that can be drawn
+        return super().offers if self.held else ("mesh",) * (self._files.mesh.suffix.lower() != ".csv")
 
     def found(self, parameters: BaseModel) -> SceneSource:
         if self.held:

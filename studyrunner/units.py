@@ -126,11 +126,6 @@ def show_known(error: float) -> str:
     return f" ± {show_percent(error)}" if error > 0.0 else ""
 
 
-def show_rtol(rtol: float) -> str:
-    """The error that was asked for, as it was given: "1 %"."""
-    return f"{100.0 * rtol:.6g} %"
-
-
 def describe_reach(last: float, end: float, error: float) -> str:
     """How far a history was computed that ends early, and the relative error of its last worn volume.
 

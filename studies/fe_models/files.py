@@ -42,11 +42,6 @@ class ModelFiles:
     recovery: Path | None = None
 
     @property
-    def has_faces(self) -> bool:
-        """Whether the mesh has faces that can be drawn."""
-        return self.mesh.suffix.lower() != ".csv"
-
-    @property
     def all(self) -> tuple[Path, ...]:
         """All of them but what the deck includes."""
         return (self.mesh, *self.matrices, *((self.recovery,) if self.recovery is not None else ()))

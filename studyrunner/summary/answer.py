@@ -20,7 +20,7 @@ from studyrunner.result.view import Result
 from studyrunner.summary.findings import LEAST_ERROR, Finding, where_is
 from studyrunner.summary.measured import about_measured
 from studyrunner.system.progress import count
-from studyrunner.units import scale_for, show_number, show_percent, show_rtol
+from studyrunner.units import scale_for, show_number, show_percent
 
 MOST_ROWS, MOST_COLUMNS = 9, 100
 
@@ -244,7 +244,7 @@ def certainty_of(result: Result, *, wore: bool = True) -> Finding | None:
 
 def _describe_certainty(n_points: int, values: Mapping[str, Any]) -> str:
     of, rtol, worst = values["of"], values["rtol"], values["worst"]
-    aim = "their rtol" if math.isnan(rtol) else f"rtol = {show_rtol(rtol)}"
+    aim = "their rtol" if math.isnan(rtol) else f"rtol = {100.0 * rtol:.6g} %"
     shown = worst if rtol < LEAST_ERROR else max(worst, LEAST_ERROR)
     within = f"within {show_percent(shown, rtol)}" if shown <= SENSITIVE_ERROR else "not known"
     n_known, n_less, n_unknown = (values[name] for name in ("n_known", "n_less", "n_unknown"))

@@ -66,12 +66,8 @@ def build_tasks(study: Study, points: Points, n_displacements: Sequence[int]) ->
         [*works, work],
         left_out,
         points.n,
-        lambda: _make_sweeps(find()),
+        lambda: map((starts := find()).make, range(starts.n)),
     )
-
-
-def _make_sweeps(starts: Starts) -> Iterator[Sweep]:
-    return map(starts.make, range(starts.n))
 
 
 def _make_histories(starts: Starts, sharing: _Sharing, outputs: Mapping[str, Any]) -> Iterator[History]:
