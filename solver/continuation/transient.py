@@ -14,22 +14,20 @@ is tested for stability, and D is bounded by this rate once a state was unstable
 """
 
 from dataclasses import dataclass, replace
-from typing import cast
 
 import numpy as np
 
 from solver.continuation.natural import NEAR_ITERATIONS, SMALL_CHANGE, SMOOTH_CHANGE
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.harmonic_balance.state import Failure, State
-from solver.model import ComplexArray, FloatArray, Matrix
+from solver.model import ComplexArray, FloatArray
 from solver.newton.run import SHORTEST_STEP, Run
 from solver.outcome import Outcome
 from solver.settings import ROUND_OFF
-from solver.structure.condensation import whole_motion
+from solver.structure.condensation import condensed_at, whole_motion
 from solver.structure.fourier import from_complex, with_static
-from solver.structure.harmonic_stiffness import DenseStiffness
 from solver.structure.joint import Joint, held
-from solver.structure.schur import condense
+from solver.structure.ring_motion import motion_of
 
 TRANSIENT_CUT = 0.35
 """Factor of the length of a refused step. Half the value takes 2.5 times the iterations of a jump at a fold; with 0.25
@@ -59,7 +57,7 @@ class Transient:
         self.relative = joint.contact.relative
         self.rates: ComplexArray = 1j * joint.omega * orders
         self.linear = [joint.model.harmonic_structure(order) for order in orders.tolist()]
-        self.loads: ComplexArray = np.zeros((orders.size, len(self.linear[0].mass)), complex)
+        self.loads: ComplexArray = np.zeros((orders.size, len(self.linear[0].load_static)), complex)
         self.loads[0] = self.linear[0].load_static
         self.loads[orders == 1] = joint.excitation_amplitude * joint.model.harmonic_structure(1).load_harmonic
 
@@ -71,15 +69,11 @@ class Transient:
     def step(self, before: Motion, inverse: float) -> Joint:
         """Joint whose balance is an implicit Euler step of length 1/`inverse`, s, from a motion `before`."""
         loads, rates = self._loads(before, inverse), self.rates + inverse
-        found = [
-            condense(cast("Matrix", of.stiffness + rate * of.damping + rate**2 * of.mass), self.relative, load)
-            for of, rate, load in zip(self.linear, rates, loads, strict=True)
-        ]
-        stiffness, force = np.array([each.stiffness for each in found]), np.array([each.force for each in found])
+        static_stiffness, moving, force = condensed_at(self.linear, rates, self.relative, loads)
         structure = replace(
             self.joint.structure,
-            static_stiffness=np.real(stiffness[0]),
-            moving=DenseStiffness(stiffness[1:]),
+            static_stiffness=static_stiffness,
+            moving=moving,
             force_h=from_complex(np.real(force[0]), force[1:].T),
         )
         return replace(self.joint, structure=held(structure, self.joint.hold))
@@ -94,9 +88,13 @@ class Transient:
 
     def _loads(self, before: Motion, inverse: float) -> ComplexArray:
         """Right-hand side of the step (1 + H, n), N."""
-        each = zip(self.linear, self.rates + inverse, before.displacement, before.velocity, strict=True)
-        inertia = [of.mass @ (rate * moved + velocity) + of.damping @ moved for of, rate, moved, velocity in each]
-        return self.loads + inverse * np.array(inertia)
+        rates, inertia = self.rates + inverse, np.zeros_like(self.loads)
+        if inverse:
+            for place, (of, rate) in enumerate(zip(self.linear, rates.tolist(), strict=True)):
+                moved, motion = before.displacement[place], motion_of(of, rate, self.relative)
+                inertia[place] = motion.times("mass", rate * moved + before.velocity[place])
+                inertia[place] += motion.times("damping", moved)
+        return self.loads + inverse * inertia
 
 
 def relax_to_periodic(joint: Joint, worn: FloatArray, start: State, start_joint: Joint, run: Run) -> State | Failure:

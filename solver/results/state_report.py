@@ -16,6 +16,7 @@ from solver.results.history import PeriodicState
 from solver.structure.condensation import whole_motion
 from solver.structure.fourier import derivative, from_complex, synthesis, to_complex, with_static
 from solver.structure.joint import Case, Joint
+from solver.structure.ring_motion import motion_of
 
 LOOP_PHASES = 128
 """Number of phases of a loop, equally spaced over a period from 0 on, whatever the number of samples of a state is."""
@@ -92,7 +93,8 @@ def resonance_frequency(joint: Joint, evaluation: Evaluation) -> tuple[float, fl
     linear = joint.model.harmonic_structure(1)
     force = joint.excitation_amplitude * linear.load_harmonic
     moved = first_motion(joint, joint.motion(evaluation), joint.excitation_amplitude)
-    inertia, work = float(np.real(np.vdot(moved, linear.mass @ moved))), complex(np.vdot(moved, force))
+    pushed = motion_of(linear, 1j * joint.omega, joint.contact.relative).times("mass", moved)
+    inertia, work = float(np.real(np.vdot(moved, pushed))), complex(np.vdot(moved, force))
     square = joint.omega**2 + work.real / inertia if inertia > 0.0 else -1.0
     return (float(np.sqrt(square)), 0.5 * abs(work) / (square * inertia)) if square > 0.0 else (float("nan"),) * 2
 

@@ -203,7 +203,7 @@ def _inverse_of_law(law: SampledLaw, flexibility: FloatArray) -> FloatArray:
 def moving(joint: Joint, fixed: BoolArray) -> BoolArray:
     """True for the displacements (n,) of the structure that move while the pairs `fixed` (n_contact,) stick."""
     dofs = joint.contact.dofs[fixed]
-    moves = np.ones(len(joint.model.linear[0].mass), bool)
+    moves = np.ones(len(joint.model.linear[0].load_static), bool)
     moves[dofs[dofs >= 0]] = False
     return moves
 

@@ -6,6 +6,7 @@ into those of the pairs (r) and all others (i),
     Z_r = A_rr - A_ri A_ii^-1 A_ir,      F_r = f_r - A_ri A_ii^-1 f_i.                                         (8)
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import cast
@@ -17,7 +18,7 @@ from solver.structure.fourier import from_complex, to_complex
 from solver.structure.harmonic_stiffness import DenseStiffness, SharedStiffness
 from solver.structure.ring import RingStructure
 from solver.structure.ring_motion import motion_of
-from solver.structure.ring_stiffness import RingStiffness, condense_ring
+from solver.structure.ring_stiffness import RingStiffness, condense_ring, stiffness_in_motions
 from solver.structure.schur import condense, dynamic_stiffness, regular
 
 DENSE_BYTES = 2e6
@@ -188,6 +189,25 @@ def _condense_shared(linear: LinearModel, relative: IntArray, rates: FloatArray,
     behind = compliance[0] @ load[others]
     force = load[relative] - dynamic_stiffness(linear, 1j * float(rates[0]), np.ix_(relative, others)) @ behind
     return SharedStiffness(linear, relative, rates, compliance), force, by_pairs, rows[:, others] @ behind
+
+
+def condensed_at(
+    structures: Sequence[LinearModel], exponents: ComplexArray, relative: IntArray, loads: ComplexArray
+) -> tuple[FloatArray, DenseStiffness | RingStiffness, ComplexArray]:
+    """Z_r (n_rel, n_rel) of the first structure, real, and of the others, and F_r (1 + H, n_rel), in motions exp(s t).
+
+    exponents (1 + H,): s, 1/s. loads (1 + H, n): N.
+    """
+    each = [*zip(structures, exponents.tolist(), loads, strict=True)]
+    if isinstance(structures[0], RingStructure):
+        rings = cast("Sequence[RingStructure]", structures)
+        motions = [(motion_of(of, rate, relative), load) for of, rate, load in each]
+        # less the forces by which the others, that move under the load, push the pairs
+        force = np.array([(load - of.force(of.behind(load)))[relative] for of, load in motions])
+        return *stiffness_in_motions(rings, exponents, relative), force
+    found = [condense(dynamic_stiffness(of, rate, ...), relative, load) for of, rate, load in each]
+    moving = DenseStiffness(np.array([one.stiffness for one in found[1:]]))
+    return np.real(found[0].stiffness), moving, np.array([one.force for one in found])
 
 
 # --- all displacements, and their change with the frequency ---

@@ -83,8 +83,11 @@ class RingStructure(LinearModel):
         return first is last or np.array_equal(first.stiffness, np.conj(last.stiffness))
 
     def stacked(self, name: str) -> ComplexArray:
-        """A part of the sector's structure in all waves, (N, ...)."""
-        return np.asarray([getattr(wave, name) for wave in self.waves], np.complex128)
+        """A part of the sector's structure in all waves, (N, ...); kept, as it is small beside that of all sectors."""
+        parts: dict[str, ComplexArray] = self.__dict__.setdefault("_stacked", {})
+        if name not in parts:
+            parts[name] = np.asarray([getattr(wave, name) for wave in self.waves], np.complex128)
+        return parts[name]
 
     @cached_property
     def conjugate(self) -> "RingStructure":

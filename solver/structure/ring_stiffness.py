@@ -9,7 +9,7 @@ amplitudes `Q u + a_f - C g` this is
 with small matrices over the sectors alone.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple, cast
@@ -166,6 +166,26 @@ def condense_harmonic(
     )
 
 
+def stiffness_in_motions(
+    rings: Sequence[RingStructure], exponents: ComplexArray, relative: IntArray
+) -> tuple[FloatArray, RingStiffness]:
+    """Static Z_r (N n, N n), real, and Z_r of the other harmonics, in motions exp(s t) with the exponents (1 + H,)."""
+    n_sectors, found = len(rings[0].waves), list[RingOfHarmonic]()
+    of_sector, nothing = relative[: relative.size // n_sectors], np.zeros(len(rings[0].waves))
+    for ring, exponent in zip(rings, exponents.tolist(), strict=True):
+        loads = np.zeros((n_sectors, len(ring.waves[0].load_static)), complex)
+        found.append(condense_harmonic(ring, of_sector, exponent, loads, nothing))
+    return _assembled(found[0]), _stiffness_of(found[1:], n_sectors, of_sector.size)
+
+
+def _assembled(rest: RingOfHarmonic) -> FloatArray:
+    """Static stiffness (N n, N n), N/m, of all sectors."""
+    stiffness = np.asarray(over_sectors(rest.waves, real=True), np.float64)
+    if rest.deviating is not None:
+        stiffness = stiffness + np.real(over_sectors(rest.pushed) @ rest.deviating @ over_sectors(rest.seen))
+    return stiffness
+
+
 def condense_ring(
     rings: tuple[RingStructure, ...], relative: IntArray, omega: float, amplitude: float, orders: tuple[int, ...]
 ) -> dict[str, Any]:
@@ -178,9 +198,6 @@ def condense_ring(
     loads = np.zeros((n_sectors, len(still.waves[0].load_static)), complex)
     loads[0] = still.waves[0].load_static
     rest = condense_harmonic(still, of_sector, 0.0, loads, np.ones(n_sectors))
-    stiffness = over_sectors(rest.waves, real=True)
-    if rest.deviating is not None:
-        stiffness = stiffness + np.real(over_sectors(rest.pushed) @ rest.deviating @ over_sectors(rest.seen))
     n_responses = rest.offset.size // n_sectors - 1
     force, found = np.zeros((relative.size, len(orders)), complex), list[RingOfHarmonic]()
     for place, (ring, order) in enumerate(zip(rings[1:], orders, strict=True)):
@@ -192,7 +209,7 @@ def condense_ring(
     offset = np.zeros((n_sectors, n_responses + 1), complex) if first is None else first.offset.reshape(n_sectors, -1)
     drive, driven = rows[0, :, -1] if found else np.zeros((n_sectors, relative.size), complex), still.driven
     return {
-        "static_stiffness": stiffness,
+        "static_stiffness": _assembled(rest),
         "moving": _stiffness_of(found, n_sectors, of_sector.size),
         "force_h": from_complex(np.real(rest.force), force),
         "static_response": _responses(np.real(rest.rows), n_sectors),

@@ -14,7 +14,7 @@ from solver.outcome import Outcome
 from solver.settings import SolverSettings
 from solver.stability.disturbances import build_monodromy
 from solver.stability.floquet import multipliers_of
-from solver.structure.condensation import build_structure, frequency_slope, whole_motion
+from solver.structure.condensation import build_structure, condensed_at, frequency_slope, whole_motion
 from solver.structure.ring import build_ring
 from tests.rings import N, one_sector, whole_ring
 
@@ -96,6 +96,19 @@ def test_all_displacements_and_the_slope_over_the_frequency_are_those_of_the_ful
     assert np.abs(slope.force - force).max() <= 1e-5 * np.abs(force).max()
     response = (after.response_h(motion_h) - before.response_h(motion_h))[:, 1:3] / (2.0 * step)
     assert np.abs(slope.response - response @ [1.0, -1.0j]).max() <= 1e-5 * np.abs(response).max()
+
+
+def test_a_step_in_time_is_that_of_the_assembled_matrices():
+    ring, random = build_ring(one_sector(1), PATTERN), np.random.default_rng(6)
+    linear, exponents = [ring.harmonic_structure(n) for n in range(3)], 40.0 + 1j * RATE * np.arange(3)
+    loads = random.normal(size=(3, 7 * N)) + 1j * random.normal(size=(3, 7 * N))
+    loads[0] = loads[0].real
+    whole = [LinearModel(*(getattr(one, name) for name in NAMES)) for one in linear]
+    (still, moving, force), (by_still, by_moving, by_force) = (
+        condensed_at(each, exponents, ring.contact.relative, loads) for each in (linear, whole)
+    )
+    for one, other in ((still, by_still), (moving.dense, by_moving.dense), (force, by_force)):
+        assert np.abs(one - other).max() <= 1e-9 * np.abs(other).max()
 
 
 def test_a_force_on_one_blade_is_that_of_the_full_matrices():
