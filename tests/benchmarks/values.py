@@ -118,6 +118,7 @@ def case(function: Callable[..., Any], read: Callable[[Any], Values], model: Cal
     return lambda structure: function(structure, *given, **named), read, model
 
 
+OFF = [0.02, -0.013, 0.0, 0.007, -0.018, 0.011]
 swept, worn = partial(case, frequency_response, of_sweep), partial(case, march_wear, of_worn)
 flown, mode = partial(case, missions, of_worn), partial(case, solver.backbone, of_mode)
 curve = partial(case, solver.response_curve, of_curve)
@@ -132,6 +133,7 @@ mass = partial(build_model, [[0.1]], None, [[0.0]], [[-1, 0, -1]], 1e-4, load_ha
 bouncing, kinds = partial(block, lift=0.2), partial(block, (0, 1, 2), (0, 1), (0, 2), (0,), (1, 2), (1,))
 held = partial(block, (0, 1), (0, 1), ground=(1e9, 0.0, 1e5), static=(3400.0, 0.0, 0.0))
 ring, other_ring, beam = partial(one_sector, 3), partial(one_sector, 5), Cantilever().model
+equal_ring, deviating = (lambda d=d, off=off: solver.build_ring(one_sector(d), off) for d, off in ((2, 0.0), (1, OFF)))
 FEW, FIVE, MANY = SolverSettings(3, 64), SolverSettings(5, 64), SolverSettings(19, 256)
 FINE, COARSE, RANGE = SolverSettings(rtol=1e-3), SolverSettings(rtol=3e-2), {"between": (180.0, 230.0)}
 WEAR, LONG, END, WAYS = 1.1e-11, 8e4, math.inf, ("up", "down", "ramp")
@@ -159,7 +161,9 @@ CASES: dict[str, Any] = {
     "responses: curve over frequency": curve(wall, (0.2, 0.26), 0.02, 0.0, settings=MANY),
     "responses: curve over load": curve(slider, 160.0, (8.0, 12.0), 0.5, settings=FIVE),
     "waves: ring": swept(ring, [320.0], 12.0, 0.3),
-    "waves: ring, unstable": worn(other_ring, 280.0, 3.3, 0.3, 1e-10, 300.0),
+    "waves: ring, backwards": worn(other_ring, 280.0, 3.3, 0.3, 1e-10, 300.0),
+    "waves: all sectors, deviating": worn(deviating, 280.0, 3.3, 0.3, 1e-10, 100.0),
+    "waves: all sectors, another wave grows": worn(equal_ring, 300.0, 10.0, 0.3, 1e-10, 100.0),
     "waves: root": worn(wave, 214.42, 1.5, 0.5, WEAR, 3000.0),
     "waves: shroud": worn(shroud, 476.0, 0.1, 0.3, 1e-11, 1e5),
     "waves: shroud, resonance": worn(shroud, "resonance", 0.1, 0.3, WEAR, 0.0, between=(350.0, 850.0)),
