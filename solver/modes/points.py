@@ -26,6 +26,7 @@ from solver.newton.run import Budget, Run, guarded
 from solver.outcome import Ended, Outcome, is_known_to
 from solver.packing import Keep
 from solver.settings import ROUND_OFF, Resolution, SolverSettings
+from solver.structure.ring import RingModel
 
 Direction = Literal["up", "down"]
 
@@ -71,6 +72,9 @@ def follow_mode(
     amplitudes: m sqrt(kg), in any order. number, direction: as in `solver.backbone`.
     settings: the limit of time holds for each point with the way from the point before. keep: called with words.
     """
+    if isinstance(model, RingModel):
+        # the equations of a mode change the matrices of the structure
+        model = model.assembled()
     way = _Way((model, number, settings), direction, keep)
     for index in sorted(range(len(amplitudes)), key=lambda index: way.place(float(amplitudes[index]))):
         began = computing_time()

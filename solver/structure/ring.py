@@ -139,6 +139,16 @@ class RingModel(ReducedModel):
 
     sector: ReducedModel | None = None
 
+    def assembled(self) -> ReducedModel:
+        """The ring with the full matrices of all sectors, for what changes them, as the equations of a mode do."""
+        shifts = self.linear if self.nodal_diameter else (0,)
+        linear = {}
+        for shift in shifts:
+            one = self.linear[shift]
+            parts = one.mass, one.damping, one.stiffness, one.load_static, one.load_harmonic, one.response
+            linear[shift] = LinearModel(*parts)
+        return ReducedModel(linear, self.contact, self.response_names, self.n_sectors, self.nodal_diameter)
+
     @property
     def tuned(self) -> ReducedModel:
         """The sector."""

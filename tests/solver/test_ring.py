@@ -10,6 +10,7 @@ from solver.arguments import check_case
 from solver.forced_response import balance_at_start, frequency_response
 from solver.histories import march_wear
 from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel
+from solver.nonlinear_modes import backbone
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
 from solver.stability.disturbances import build_monodromy
@@ -156,6 +157,15 @@ def test_amplification_by_deviations_keeps_to_whiteheads_bound_and_comes_near_it
     start = [*1e3 * drawn[found.argmax()], 1.0]
     worst = minimize(opposite, start, method="Nelder-Mead", options={"maxfev": 3000})
     assert 0.9 * bound <= -worst.fun / tuned <= bound
+
+
+def test_a_mode_of_equal_sectors_is_that_of_one():
+    one = backbone(one_sector(0), [6e-5], 0.3)
+    assert one.outcome[0].complete
+    # the same motion in N sectors has N times the modal mass
+    of_ring = backbone(build_ring(one_sector(0)), [6e-5 * np.sqrt(N)], 0.3)
+    assert of_ring.frequency[0] == pytest.approx(one.frequency[0], rel=1e-9)
+    assert of_ring.damping_ratio[0] == pytest.approx(one.damping_ratio[0], rel=1e-6)
 
 
 @pytest.mark.slow
