@@ -98,6 +98,7 @@ class WearHistory(Ended, Presented):
       never.
     - inaccurate_from, inaccurate_in, inaccurate_error: count from which on the error of a state is above rtol, inf if
       never; name of the result, and its largest error from there on.
+    - undecided_from: count from which on it is not known whether a pair goes on to wear, inf if never.
     - held_from: count from which on the mean position of a joint that slides as a whole is held, inf if never.
     - adaptive: whether its steps were chosen to keep rtol.
     - unjudged: why it is not known whether the first or the last vibration is stable; "" where both are.
@@ -158,6 +159,7 @@ class WearHistory(Ended, Presented):
     inaccurate_in: str = ""
     inaccurate_error: float = 0.0
     held_from: float = math.inf
+    undecided_from: float = math.inf
     adaptive: bool = False
     unjudged: str = ""
 
@@ -176,6 +178,9 @@ def judge(history: WearHistory, rows: IntArray, rtol: float, slower: float = 1.0
     volumes = float(history.worn_volume[last]), float(history.reference_volume[last])
     coarser = "with longer steps, other harmonics and a coarser sweep"
     uncertain = describe_uncertain(*volumes, error, rtol, coarser, history.reference_end)
+    if history.undecided_from < at:
+        ceases = f"at cycle {in_digits(history.undecided_from / slower)} a pair ceases to wear, or by a hair does not"
+        uncertain = f"the error of the worn volume is not known: {ceases}, and wears on ever faster"
     cut_off = describe_cut_off(history.cut_off_cycle / slower) if at >= history.cut_off_cycle else ""
     inaccurate = held = ""
     # inf means "never", but is the count of a final state, too

@@ -16,6 +16,7 @@ from solver.accuracy.refinement import DIFFERENCE_SAFETY
 from solver.model import FloatArray
 from solver.outcome import absolute, in_whole
 from solver.wear.slow_time import Solution
+from solver.wear.undecided import exchanged, undecided_from
 
 PAIR_OVER_VOLUME = 2.0
 """Relative error of the depth of a pair over that of the worn volume, at least, where four or more pairs wear. With 1
@@ -51,12 +52,14 @@ class Compared:
 
     counts (n,): ascending. values, reference: as of `Course.read`; the latter empty where there is no other solution.
     follows: whether the frequency of the excitation follows the structure.
+    undecided: count from which on it is not known whether a pair goes on to wear (`undecided_from`), inf if never.
     """
 
     counts: FloatArray
     values: Mapping[str, Any]
     reference: Mapping[str, Any]
     follows: bool = False
+    undecided: float = math.inf
 
     def other(self, name: str) -> Any:
         """Values of the other solution."""
@@ -78,12 +81,13 @@ def compare(
     """
     course, other = solution.course, solution.compared
     if given and other is not None and other.state is not None:
-        _, error = compare(other, counts, follows=follows)
-        both = Compared(counts, course.read(counts), other.course.read(counts), follows)
+        adaptive, error = compare(other, counts, follows=follows)
+        both = Compared(counts, course.read(counts), other.course.read(counts), follows, adaptive.undecided)
         return both, error_of_given_steps(both, error, course.area)
     known = None if given or other is None or not other.course.nodes else other.course
+    undecided = math.inf if known is None else undecided_from(course, known)
     both, steps = (
-        Compared(at, part(course.read(at)), {} if known is None else part(known.read(at)), follows)
+        Compared(at, part(course.read(at)), {} if known is None else part(known.read(at)), follows, undecided)
         for at in (counts, course.counts)
     )
     return both, history_error(both, steps, course.area)
@@ -108,16 +112,18 @@ def history_error(outputs: Compared, steps: Compared, area: FloatArray) -> Histo
     worn_at_first = np.minimum(values["wear_rate"][0] * outputs.counts, volume)
     at_start = absolute(by_resolution, volume) + absolute(by_sweep, worn_at_first)
     error = np.maximum(error, at_start + values["local"])
+    error = np.where(outputs.counts > outputs.undecided, np.inf, error)
     # a pair that agrees with the reference solution better than the volume does so by chance (dovetail, 211.25 Hz: else
     # 5 of 24 deep pairs are outside of their errors, by seven times); the error of the volume is smaller than that of
     # its independent pairs by the root of the number of equal pairs that would share the volume
     squares = ((depth * area) ** 2).sum(axis=1)
     n_equal = np.divide(volume**2, squares, out=np.ones_like(squares), where=squares > 0.0)
     of_pair = np.minimum(PAIR_OVER_VOLUME, np.sqrt(n_equal)) * _over(error, volume)
-    of_pairs = np.maximum(of_pairs, absolute(of_pair[:, None], depth))
+    of_pairs = np.maximum(of_pairs, absolute(of_pair[:, None], depth)) + exchanged(values, "wear_depth")
     # also where nothing wears: the wear rate is known as the slip is
     of_heat = np.maximum(of_pair, values["wear_rate_error"][0])
     heat = np.maximum(heat, absolute(of_heat[:, None], values["dissipated_energy"]))
+    heat = heat + exchanged(values, "dissipated_energy")
     response = np.maximum(response, _change_within(volume, error, steps, area))
     frequency = _frequency_error(outputs, DIFFERENCE_SAFETY, np.zeros_like(volume))
     return _completed(outputs, HistoryError(error, of_pairs, heat, response, wear_rate, frequency), area)

@@ -160,6 +160,7 @@ def _assembled(model: ReducedModel, start: StartState, request: WearRequest, sol
         fold_frequency=start.fold_frequency,
         cycles_to_target=target,
         cycles_to_target_error=target_error,
+        undecided_from=both.undecided,
         cut_off_cycle=first_cut_off(model.contact, counts, values["mean_pressure"], values["wear_depth"]),
     )
 

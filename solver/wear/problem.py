@@ -38,6 +38,7 @@ from solver.wear.check import choose_harmonics, full_check, report_only, unstabl
 from solver.wear.jump import jump
 from solver.wear.slow_time import RTOL_RATIO, Course, Guide, Node
 from solver.wear.step import allowed_error, attempt_step, explicit_step_limit, too_long
+from solver.wear.undecided import own_growth
 from solver.wear.wearing_joint import WearingJoint, WearRequest, WearState
 
 FIRST_STEP, FIRST_DEPTH = 0.05, 0.01
@@ -117,6 +118,8 @@ class WearProblem(WearingJoint):
             after = replace(after, guide=replace(after.guide, resolutions=(*known, (after.cycle, now))))
         # local: sum of the local errors of the steps so far, m3
         values = report | {"local": after.last.error + local}
+        if self.guide is None and self.request.steps is None:
+            values["own_growth"] = np.zeros(self.area.size) if state is None else own_growth(self, state, after)
         depth, energy = after.at.slow
         return after, course.after(Node(after.cycle, depth, after.rate, energy, after.energy_rate, values))
 
