@@ -14,6 +14,7 @@ below 0.5; with the difference of the rates at this count alone this load is as 
 """
 
 import math
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -75,11 +76,11 @@ def _wears(course: Course) -> BoolArray:
     return np.asarray(course.rates[-1] > ROUND_OFF * course.rates[-1].max(initial=0.0))
 
 
-def exchanged(values: dict[str, Any], name: str) -> FloatArray:
+def exchanged(values: Mapping[str, Any], name: str) -> FloatArray:
     """Largest difference (n, n_contact) of a value of each pair to its equals: pairs that slip under the same pressure
     and wear as fast at the first count. 0 where there is none, or where the first state is not known as this.
     """
-    grown = values[name]
+    grown: FloatArray = values[name]
     if "mean_pressure" not in values:
         return np.zeros_like(grown)
     pressure, rate = values["mean_pressure"][0], values["depth_rate"][0]

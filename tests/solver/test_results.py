@@ -127,6 +127,7 @@ ALONE = {"worn_volume_error": np.array([0.0, np.inf, np.inf]), "reference_end": 
         # an unknown error is no large one
         (ALL, {**UNKNOWN, "worn_volume_error": np.full(3, np.inf)}, Outcome.INACCURATE, "is not known: "),
         (ALL, {**UNKNOWN, **ALONE}, Outcome.INACCURATE, "a coarser sweep the history ends early: lost"),
+        (ALL, {**UNKNOWN, **ALONE, "undecided_from": 4.0}, Outcome.INACCURATE, "not known: at cycle 8 a pair ceases"),
         # the steps of an adaptive history aim at rtol
         ([0, 1], {**UNKNOWN, "adaptive": True}, Outcome.INACCURATE, "worn volume 1 mm3"),
         # a history that shares it and ends before is known
