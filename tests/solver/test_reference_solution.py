@@ -20,7 +20,7 @@ from solver.wear.errors import PAIR_OVER_VOLUME, Compared, HistoryError, error_o
 from solver.wear.history import integrate_together
 from solver.wear.problem import WearProblem
 from solver.wear.slow_time import Course, Node
-from solver.wear.undecided import undecided_from
+from solver.wear.undecided import BESIDE, undecided_from
 from solver.wear.wearing_joint import Given, WearRequest
 from tests.solver.models import assert_same, branch_states, dovetail, march_wear, scene
 from tests.solver.worn_slider import depths_of_motion
@@ -335,8 +335,8 @@ def course_of(begins, *, goes_on=False):
 
 
 def test_it_is_not_known_whether_a_pair_ceases_to_wear_if_its_rate_may_be_above_the_limit():
-    # both cease to wear: the truth may be above the limit where the other one is as far below, with the safety factor
-    begins, margin = LIMIT - 0.1, 0.1 / DIFFERENCE_SAFETY
+    # both cease to wear: the truth may be above the limit where the other one is a third as far below
+    begins, margin = LIMIT - 0.1, 0.1 / BESIDE
     course, ceased = course_of(begins)
     assert undecided_from(course, course_of(begins - 0.5 * margin)[0]) == math.inf
     assert undecided_from(course, course_of(begins - 1.2 * margin)[0]) == ceased
