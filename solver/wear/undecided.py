@@ -25,15 +25,13 @@ from solver.wear.step import rate_slope
 from solver.wear.wearing_joint import WearingJoint, WearState
 
 WINDOW = 0.5
-"""Fraction of the count at which a pair ceases to wear from which on rates are compared, as `CROSSING_WINDOW`."""
+"""Fraction of the count at which a pair ceases to wear from which on rates are compared, as `CROSSING_WINDOW`; and not
+before the last time in which a difference grows by e, as g is not constant for longer."""
 
 BESIDE = 3.0
 """How far the true rate of such a pair may be above that of the history, over the difference to the reference solution.
 The 147 mm3 of above, also with `rtol` 0.2 to 0.07: the difference is 1.1 to 0.37 times what it may be, g over -dr/dn.
 All other random loads, 72 with `rtol` 0.1, whose history is complete: at most 0.30."""
-
-MOST_EXPONENT = 100.0
-"""Growth of a difference, in powers of e, that is more than anything."""
 
 
 def own_growth(wearing: WearingJoint, state: WearState, end: WearState) -> FloatArray:
@@ -61,16 +59,16 @@ def undecided_from(course: Course, other: Course) -> float:
     for end in range(1, at.size):
         growth = course.nodes[end].values["own_growth"]
         for pair in np.flatnonzero(growth):
-            rate, beside = rates[:, pair], np.interp(at, other.counts, other.rates[:, pair])
-            # where one of both goes on to wear their difference shows it
-            if _wears(course)[pair] or _wears(other)[pair]:
+            g, ceases = growth[pair], at[end - 1]
+            # where one of both goes on to wear their difference shows it; too late it does not matter
+            if _wears(course)[pair] or _wears(other)[pair] or g * (at[-1] - ceases) < 1.0:
                 continue
-            first = int(np.searchsorted(at, WINDOW * at[end - 1]))
-            exponent = np.minimum(growth[pair] * (at[end - 1] - at[first:end]), MOST_EXPONENT)
-            apart = (np.abs(rate - beside)[first:end] * np.exp(exponent)).max()
+            rate, beside = rates[:, pair], np.interp(at, other.counts, other.rates[:, pair])
+            first = int(np.searchsorted(at, ceases - min(1.0 / g, (1.0 - WINDOW) * ceases)))
+            apart = (np.abs(rate - beside)[first:end] * np.exp(g * (ceases - at[first:end]))).max()
             falls = (-np.diff(rate) / np.diff(at))[max(end - 2, 0) : end].max()
-            if BESIDE * growth[pair] * apart >= falls:
-                return float(at[end - 1])
+            if BESIDE * g * apart >= falls:
+                return float(ceases)
     return math.inf
 
 
