@@ -6,10 +6,10 @@ goes to the same side in half of all cases. Each of these pairs may have the dep
 1.04 N, 16 pairs: depths of 8 pairs that differ by 5 % from their equals, where 1.3 % was told.
 
 Pairs that cease to wear. With a rate r that grows by itself, dr/dn = g r - s, a pair ceases to wear, unless its rate is
-larger by -dr/dn / g: then it wears on, and faster and faster. History and reference solution, both with few harmonics or
-long steps, may see it cease although it does not. Where the history is above the coarser reference solution, the truth
-is above the history; how far, tells their difference at some count before, grown until then. Dovetail, 212.281 Hz,
-1.16 N, `rtol` 0.1: 147 mm3 for 45, where 4 % were told. The difference when the pair ceases is as in other loads.
+larger by -dr/dn / g: then it wears on, and faster and faster. History and reference solution, both with few harmonics
+or long steps, may see it cease although it does not. Where the history is above the coarser reference solution, the
+truth is above the history; how far, tells their difference at some count before, grown until then. Dovetail, 212.281
+Hz, 1.16 N, `rtol` 0.1: 147 mm3 for 45, where 4 % were told. The difference when the pair ceases is as in other loads.
 """
 
 import math
@@ -30,9 +30,9 @@ before the last time in which a difference grows by e, as g is not constant for 
 
 BESIDE = 3.0
 """How far the true rate of such a pair may be above that of the history, over how far that is above the reference
-solution. The 147 mm3 of above, with `rtol` 0.2 to 0.07: this is 1.5 to 0.37 times what it may be, -dr/dn / g. Other random
-loads, 61 with `rtol` 0.1 and ten with 0.01, that slide: at most 0.30. Mesh 2, 211 to 212.75 Hz: below 0.15, and 0.85 at
-212.5 Hz, where 0.072 or 0.094 mm3 wear, by the harmonics of the sweep."""
+solution. The 147 mm3 of above, with `rtol` 0.2 to 0.07: this is 1.5 to 0.37 times what it may be, -dr/dn / g. Other
+random loads, 61 with `rtol` 0.1 and ten with 0.01, that slide: at most 0.30. Mesh 2, 211 to 212.75 Hz: below 0.15, and
+0.85 at 212.5 Hz, where 0.072 or 0.094 mm3 wear, by the harmonics of the sweep."""
 
 
 def own_growth(wearing: WearingJoint, state: WearState, end: WearState) -> FloatArray:
