@@ -146,25 +146,60 @@ def build_contact_pairs(
     Raises SceneError where nodes find no point of the other surface, do not face it, find it behind their own body, or
     move in two pairs.
     """
-    parts, coordinates = [], mesh.coordinates
+    parts = []
     for place, contact in enumerate(contacts):
-        if len(shared := np.intersect1d(contact.first.nodes, contact.second.nodes)):
-            found = f"{contact.first.name} and {contact.second.name} share {len(shared)} nodes"
-            raise SceneError("contact", found, "give the two bodies nodes of their own where they touch")
-        both = contact.first, contact.second
-        # roots of the mean areas of their facets
-        sizes = [float(np.sqrt(each.areas_and_normals(coordinates)[0].sum() / len(each.facets))) for each in both]
-        finer = contact.turned_round if sizes[1] < (1.0 - 1e-6) * sizes[0] else contact
-        facet = max(sizes)
-        limit = min(facet, _TOLERANCE * facet if contact.tolerance is None else contact.tolerance)
-        match = _match(coordinates, finer, place, along, axis)
-        if (match.apart > limit).any():
-            # a coarse surface may lie inside a finer one that goes on
-            other = _match(coordinates, finer.turned_round, place, along, axis)
-            match = match if (other.apart > limit).any() else other
+        match, limit = _best_match(mesh, contact, place, along, axis)
         _check_match(match, mesh, limit)
         parts.append(match.pairs)
     return _joined(parts, mesh)
+
+
+def build_ties(
+    mesh: SolidMesh, ties: Sequence[ContactSurfaces], along: FloatArray
+) -> tuple[ContactPairs, tuple[str, ...]]:
+    """As `build_contact_pairs`, of surfaces that are glued; a sentence on each whose nodes are tied in part.
+
+    Where neither surface is covered, nodes of the first one that are too far stay free, as in Abaqus. Raises SceneError
+    where no node is near.
+    """
+    parts, notes = [], []
+    for place, tie in enumerate(ties):
+        match, limit = _best_match(mesh, tie, place, along, None)
+        if (match.apart > limit).any():
+            match = _match(mesh.coordinates, tie, place, along, None)
+        near = match.apart <= limit
+        if near.any() and not near.all():
+            found = f"{np.count_nonzero(~near)} of {len(near)} nodes of {tie.first.name} are farther than {limit:.3g} m"
+            remedy = "give a larger POSITION TOLERANCE if they are to be"
+            notes.append(f"{found} from {tie.second.name} and are not tied, as in Abaqus: {remedy}")
+            pairs, cosines = match.pairs.chosen(near), match.facing[near]
+            match = replace(match, pairs=pairs, apart=match.apart[near], facing=cosines, depth=match.depth[near])
+        _check_match(match, mesh, limit)
+        parts.append(match.pairs)
+    return _joined(parts, mesh), tuple(notes)
+
+
+def _best_match(
+    mesh: SolidMesh, contact: ContactSurfaces, place: int, along: FloatArray, axis: CyclicAxis | None
+) -> tuple["_Match", float]:
+    """Pairs of the nodes of the finer surface, or of those of the other one where they alone are all near; largest
+    distance, m. Raises SceneError where the surfaces share nodes.
+    """
+    if len(shared := np.intersect1d(contact.first.nodes, contact.second.nodes)):
+        found = f"{contact.first.name} and {contact.second.name} share {len(shared)} nodes"
+        raise SceneError("contact", found, "give the two bodies nodes of their own where they touch")
+    both, coordinates = (contact.first, contact.second), mesh.coordinates
+    # roots of the mean areas of their facets
+    sizes = [float(np.sqrt(each.areas_and_normals(coordinates)[0].sum() / len(each.facets))) for each in both]
+    finer = contact.turned_round if sizes[1] < (1.0 - 1e-6) * sizes[0] else contact
+    facet = max(sizes)
+    limit = min(facet, _TOLERANCE * facet if contact.tolerance is None else contact.tolerance)
+    match = _match(coordinates, finer, place, along, axis)
+    if (match.apart > limit).any():
+        # a coarse surface may lie inside a finer one that goes on
+        other = _match(coordinates, finer.turned_round, place, along, axis)
+        match = match if (other.apart > limit).any() else other
+    return match, limit
 
 
 def match_nodes(
@@ -321,7 +356,7 @@ def _check_match(match: _Match, mesh: SolidMesh, limit: float) -> None:
     if len(aside := np.flatnonzero(match.facing > 0.0)):
         found = f"{len(aside)} of {n} nodes of {moving} do not face {opposite}, as node"
         remedy = "leave them out of the surface"
-        raise SceneError("contact", f"{found} {mesh.numbers[contact.first.nodes[aside[0]]]}", remedy)
+        raise SceneError("contact", f"{found} {mesh.numbers[match.pairs.moving[aside[0]]]}", remedy)
 
 
 def _check_near(contact: ContactSurfaces, apart: FloatArray, limit: float, mesh: SolidMesh, remedy: str) -> None:

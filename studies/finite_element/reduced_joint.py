@@ -16,6 +16,9 @@ from studies.finite_element.structure import FeModel, JointDefinition, Reduction
 from studies.scene import Progress, silent
 from studies.scene_error import SceneError
 
+ABOVE = 1.001
+"""Over the frequency of a suspension: beyond it a motion is none as one body."""
+
 
 @dataclass(frozen=True)
 class FeScene:
@@ -43,8 +46,9 @@ def build_fe_scene(
     first and second tangent; then modal coordinates of the glued structure. The static load, that of the rotation and
     the preload, enters nodal diameter 0 only, the unit harmonic load that of the excitation only, but for a ring. The
     damping is that of the model's matrices, else `loss_factor / omega_1` times the stiffness without prestress where
-    that is known, omega_1 the first frequency of the glued structure, rad/s, at the nodal diameter of the excitation.
-    Coriolis forces are left out. Raises SceneError where the model describes no possible joint.
+    that is known, omega_1 the first frequency of the glued structure, rad/s, at the nodal diameter of the excitation
+    and above the suspension. Coriolis forces are left out. Raises SceneError where the model describes no possible
+    joint.
     """
     excited, n_sectors = options.nodal_diameter, 0 if joint.cut is None else joint.cut.axis.n_sectors
     if excited > n_sectors // 2:
@@ -66,7 +70,9 @@ def build_fe_scene(
         frequencies, forms, generalised = prepared.reduce(k, options.n_modes, vectors)
         found[k] = frequencies / (2.0 * np.pi)
         if k == excited:
-            damping = options.loss_factor / frequencies[0]
+            # the suspension of a free structure is none of its material
+            elastic = frequencies[frequencies > ABOVE * 2.0 * np.pi * model.suspension]
+            damping = options.loss_factor / (elastic if len(elastic) else frequencies)[0]
         if k in wanted:
             static, load, *seen = generalised.T
             responses, blade = np.split(np.array(seen).conj(), [len(joint.responses)])

@@ -15,7 +15,7 @@ from scipy import sparse
 from solver.model import BoolArray, FloatArray, IntArray
 from studies.finite_element.constraints import Constraints, eliminate, resolve
 from studies.finite_element.cut_faces import CutFaces
-from studies.finite_element.pairing import ContactPairs, Contacts, build_contact_pairs
+from studies.finite_element.pairing import ContactPairs, Contacts, build_contact_pairs, build_ties
 from studies.finite_element.solid_mesh import Rotation, SolidMesh
 from studies.scene_error import SceneError
 
@@ -113,7 +113,8 @@ class Structure:
 
     held (n_nodes, 3): displacements that are 0, or depend on others by the constraints. cut: cut faces; None where the
     structure is no cyclic sector. followers (m,): nodes that follow others, those of the pairs first. points (3 m,
-    3 n_nodes): what they follow in this sector; sectors (m,): in which it is; labels (m,): what joins them.
+    3 n_nodes): what they follow in this sector; sectors (m,): in which it is; labels (m,): what joins them. notes: on
+    nodes that a tie does not join.
     """
 
     held: BoolArray
@@ -124,6 +125,7 @@ class Structure:
     points: sparse.csr_matrix
     sectors: IntArray
     labels: tuple[str, ...]
+    notes: tuple[str, ...] = ()
 
     def _follow(self, nodal_diameter: int) -> tuple[IntArray, sparse.csr_matrix, sparse.csr_matrix, sparse.csr_matrix]:
         """Displacements (3 m,) of the followers; those of all nodes that they are, but for what is held; what they
@@ -180,17 +182,22 @@ def build_structure(model: FeModel, joint: JointDefinition) -> Structure:
             for each in joint.contacts
         ]
         pairs = build_contact_pairs(model.mesh, contacts, along, axis)
-    ties = build_contact_pairs(model.mesh, joint.ties, along) if joint.ties else None
+    ties, notes = build_ties(model.mesh, joint.ties, along) if joint.ties else (None, ())
     _check_followers(constraints, numbers, cut, pairs, ties)
     held = _hold_cut_faces(joint.held, cut, numbers)
     pairs = _merge_cut_pairs(_hold_pairs(pairs, numbers, held, constraints, cut), cut, numbers)
     if ties is not None:
-        # held nodes, those that follow their image or move in a contact pair are bound already
+        # held nodes and those that follow their image are bound already
         bound: BoolArray = np.asarray(held.all(axis=1))
-        bound[pairs.moving] = True
         if cut is not None:
             bound[cut.right] = True
         ties = ties.chosen(~bound[ties.moving])
+        pairs = _merge_tied_pairs(pairs, ties)
+        if (moving := np.isin(ties.moving, pairs.moving)).any():
+            found = f"{np.count_nonzero(moving)} nodes that are tied, as node {numbers[ties.moving[moving][0]]}"
+            remedy = "let the surface in contact go on beyond the tie"
+            notes += (f"{found}, move in contact pairs: they are not tied; {remedy}",)
+            ties = ties.chosen(~moving)
     followers = []
     for each, surfaces in ((pairs, joint.contacts), (ties, joint.ties)):
         if each is not None:
@@ -202,7 +209,8 @@ def build_structure(model: FeModel, joint: JointDefinition) -> Structure:
         followers.append((cut.right, images, np.ones(n, dtype=np.int64), ["the cut faces"] * n))
     nodes, points, sectors, names = zip(*followers, strict=True)
     joined = np.concatenate(nodes), sparse.vstack(points, format="csr"), np.concatenate(sectors)
-    return Structure(held, cut, constraints, pairs, *joined, tuple(label for each in names for label in each))
+    joins = tuple(label for each in names for label in each)
+    return Structure(held, cut, constraints, pairs, *joined, joins, notes)
 
 
 def _check_followers(
@@ -265,6 +273,21 @@ def _merge_cut_pairs(pairs: ContactPairs, cut: CutFaces | None, numbers: IntArra
     area = pairs.area.copy()
     area[left] += area[right]
     return replace(pairs, area=area).chosen(np.setdiff1d(np.arange(pairs.n_contact), right))
+
+
+def _merge_tied_pairs(pairs: ContactPairs, ties: ContactPairs) -> ContactPairs:
+    """Pairs without those of tied nodes where all nodes that these follow move in pairs of the same surfaces, as where
+    a surface in contact goes on from one part to the next: their areas go to these.
+    """
+    tied = np.isin(pairs.moving, ties.moving)
+    places = np.flatnonzero(tied)
+    order = np.argsort(ties.moving)
+    rows = order[np.searchsorted(ties.moving, pairs.moving[places], sorter=order)]
+    alike = pairs.surface[places][:, None] == pairs.surface
+    share = ties.opposite[rows][:, pairs.moving].toarray() * (alike & ~tied)
+    covered = share.sum(axis=1) > 1.0 - _ROUND_OFF
+    area = pairs.area + pairs.area[places[covered]] @ share[covered]
+    return replace(pairs, area=area).chosen(np.setdiff1d(np.arange(pairs.n_contact), places[covered]))
 
 
 def _hold_pairs(

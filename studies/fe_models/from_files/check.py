@@ -13,7 +13,7 @@ from solver import SolverSettings, march_wear
 from solver.model import BoolArray, FloatArray, IntArray, LinearModel, ReducedModel
 from studies.fe_models.from_files.model import LoadedModel, reduce_model
 from studies.finite_element.pairing import ContactPairs
-from studies.finite_element.reduced_joint import FeScene
+from studies.finite_element.reduced_joint import ABOVE, FeScene
 from studies.scene import Progress, make_compliant, silent
 
 N_FREQUENCIES = 8
@@ -52,15 +52,17 @@ def describe_model(loaded: LoadedModel, scene: FeScene, progress: Progress = sil
         rows.append(("sectors", f"{n}, {360.0 / n:.5g} degrees each, {len(joint.cut.left)} nodes on a cut face"))
     rows += [("contact", text) for text in _contacts(scene)]
     rows += [("glued", f"{tie.name} stay glued") for tie in joint.ties]
+    rows += [("warning", text) for text in prepared.structure.notes]
     progress("natural frequencies of the glued model")
     k = parameters.nodal_diameter
-    turning = prepared.frequencies(k, N_FREQUENCIES)
+    n_shown = N_FREQUENCIES + 6 * (parameters.suspension > 0.0)  # motions as one body
+    turning = prepared.frequencies(k, n_shown)
     where = f"nodal diameter {k}: " if joint.cut is not None else ""
     glued = f"{where}{_frequencies(turning)} Hz without prestress"
     if loaded.model.forms is not None:
         glued = f"{where}{_frequencies(turning)} Hz, with what the matrices hold"
     elif "elastic" in prepared.forms:
-        still = prepared.frequencies(k, N_FREQUENCIES, "elastic")
+        still = prepared.frequencies(k, n_shown, "elastic")
         glued = f"{where}{_frequencies(still)} Hz at rest, {_frequencies(turning)} Hz with prestress"
     rows.append(("glued", glued))
     first = dict(sorted((k, found[0]) for k, found in scene.glued_frequencies.items()))
@@ -139,7 +141,8 @@ def _reduction_error(loaded: LoadedModel, scene: FeScene) -> str:
         return f"none: there are no more than {n_modes} modes with the pairs glued"
     more = parameters.model_copy(update={"stuck_modes": 2 * parameters.stuck_modes})
     finer = reduce_model(replace(loaded, parameters=more), 1, prepared=scene.prepared).model
-    own, other = (_sliding_frequencies(each.linear[k], each)[:N_FREQUENCIES] for each in (model, finer))
+    own, other = (_sliding_frequencies(each.linear[k], each) for each in (model, finer))
+    own, other = (each[each > ABOVE * parameters.suspension][:N_FREQUENCIES] for each in (own, other))
     n = min(len(own), len(other))
     elastic = other[:n] > 1e-3 * other[:n].max()
     own, other = (each[:n][elastic][: N_FREQUENCIES // 2] for each in (own, other))
