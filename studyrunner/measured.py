@@ -1,7 +1,8 @@
-"""[measured] of a study: what was measured on a joint, with standard deviations; from CSV files or as lists of numbers.
+"""[measured] of a study: what was measured on a joint, with standard deviations; from files or as lists of numbers.
 
-A file has a first line with the names of its columns and their units, `cycle,worn_volume_mm3,standard_deviation_mm3`,
-and a row for each number. A depth is positive where material is missing.
+Responses may be in files of universal format (`universal_file`). Any other file has a first line with the names of its
+columns and their units, `cycle,worn_volume_mm3,standard_deviation_mm3`, and a row for each number. A depth is positive
+where material is missing.
 """
 
 import re
@@ -14,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import BeforeValidator, Field
 
+from studyrunner.universal_file import SUFFIXES, read_response
 from studyrunner.user_error import UserError, Verbatim
 from studyrunner.values import Listed, NotNegative, Positive, Section, Wrong, listed
 
@@ -64,7 +66,7 @@ class Measurement(Section):
 
     over: what `at` is. cycle: count at which a profile, or a response over the frequency, was measured; by default the
     last one, and the first one, of the study. surface: of a profile; response: of an amplitude, by default the first
-    one. share: of the computed wear. file: where they are from.
+    one. share: of the computed wear. file: where they are from; record, force, between: what of a universal file.
     """
 
     over: Over = Field("cycle", description='what `at` is: "cycle", "x", m, "frequency", Hz, or "modal_amplitude"')
@@ -79,7 +81,14 @@ class Measurement(Section):
         1.0, description="of the computed wear, that of both bodies, which the measured body has"
     )
     response: str = Field("", description="of an amplitude")
-    file: str = Field("", description="CSV file with the numbers, beside the study file")
+    file: str = Field(
+        "", description="CSV file with the numbers, or universal file (.uff, .unv), beside the study file"
+    )
+    record: int | None = Field(None, ge=1, description="number of the response among those of a universal file")
+    force: Positive | None = Field(None, description="of a universal file: excitation amplitude of the amplitude, N")
+    between: Annotated[tuple[NotNegative, NotNegative], BeforeValidator(lambda given: tuple(listed(given)))] | None = (
+        Field(None, description="of a universal file: from and to which frequency, Hz")
+    )
 
     def rules(self) -> Iterator[Wrong]:
         """As many values as places, and one deviation or as many."""
@@ -108,7 +117,9 @@ class MeasuredSection(Section):
     profile: _Several = Field((), description="worn profile of a surface: {file, standard_deviation, cycle, surface}")
     worn_volume: _Several = Field((), description="over the cycles")
     wear_depth: _Several = Field((), description="of the deepest pair, over the cycles")
-    response_amplitude: _Several = Field((), description="over the cycles or the frequency")
+    response_amplitude: _Several = Field(
+        (), description="over the cycles or the frequency; of a universal file {file, record, force, between}"
+    )
     excitation_frequency: _Several = Field((), description="that of a followed resonance, over the cycles")
     natural_frequency: _Several = Field((), description="of a mode, over the cycles or the modal amplitude")
     damping_ratio: _Several = Field((), description="of a mode, over the cycles or the modal amplitude")
@@ -153,8 +164,11 @@ def read_measured(table: object, source: str, folder: Path) -> dict[str, object]
             if isinstance(each, dict) and "file" in each and "value" not in each:
                 path, key = folder / str(each["file"]), f"measured.{name}.file"
                 if not path.is_file():
-                    raise UserError(source, key, each["file"], f"give the path of a CSV file: {path} is not there")
-                own = read_columns(path, name)
+                    raise UserError(source, key, each["file"], f"give the path of a file: {path} is not there")
+                universal = path.suffix.lower() in SUFFIXES
+                if universal and name != "response_amplitude":
+                    raise UserError(source, key, each["file"], "give a CSV file: universal files hold responses alone")
+                own = read_response(path, f"measured.{name}", each) if universal else read_columns(path, name)
                 if "standard_deviation" not in {*each, *own}:
                     remedy = "give it, in SI, or a column of the file: how well is known decides what fits"
                     raise UserError(source, f"measured.{name}.standard_deviation", None, remedy)
