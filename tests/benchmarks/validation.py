@@ -1,20 +1,22 @@
 """Computed values beside what others derived, integrated in time, computed and measured, as the page shows them.
 
-    python -m tests.benchmarks.validation [coupon] [component] [assembly] [--page solver/VALIDATION.md]
+    python -m tests.benchmarks.validation [coupon] [component] [assembly] [benchmark] [--page solver/VALIDATION.md]
 
 Cases: partial slip of a cylinder worn to the end (Ciavarella and Hills); a cylinder in gross slip, 18.5 N/mm, +-25 um
 (McColl, Ding and Leen, Wear 256 (2004) 1114); Ti-6Al-4V on itself, a cylinder of 80 mm on a flat, 1066 N/mm, 8 mm long,
 +-75 um of sliding, 5000 cycles at 0.05 to 5 Hz (Fouvry and others, Wear 2017), by the law of friction power, whose
 three numbers are fitted to these rows, with the friction of the measured energy; the bundled dovetail by
-`time_integration`, and a ring of six sectors by `ring`, whose volumes are in their files.
+`time_integration`, and a ring of six sectors by `ring`, whose volumes are in their files; the studies of `cases`, each
+with its statement, whose targets others can meet.
 
 As ASME V&V 20: E is the difference to the reference over the reference, u_num the estimated error over the root of
 three, u_D the uncertainty of the reference; a case passes where |E| is at most twice the root of the sum of their
-squares. With `--page` the table is put into the page, and its picture beside it. 10 CPU minutes.
+squares. With `--page` the table is put into the page, and its picture beside it. 11 CPU minutes.
 """
 
 import csv
 import math
+import tempfile
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -27,6 +29,7 @@ from solver.contact.wear_law import PowerTerms, WearLaw
 from solver.settings import SolverSettings
 from studies import build_scene
 from studies.scenes.cylinder_on_flat import line_worn_depth
+from studyrunner import run_study
 from studyrunner.report.drawing import line_style, style
 from tests.benchmarks.error_bars import WEAR
 from tests.benchmarks.frame import Table, arguments
@@ -164,13 +167,41 @@ def assembly() -> Iterator[Case]:
             yield Case("assembly", name, "time integration", true, 0.002, volume, error)
 
 
+def read_targets() -> list[dict[str, str]]:
+    """Rows of `cases/targets.csv`."""
+    with (FILES / "cases" / "targets.csv").open(encoding="utf-8") as file:
+        return list(csv.DictReader(file))
+
+
+def run_case(row: dict[str, str], folder: Path) -> tuple[float, float]:
+    """What is asked of a case, in the unit of its target, and its estimated error, relative."""
+    with run_study(FILES / "cases" / f"{row['case']}.toml", folder / f"{row['case']}.nc", progress=False) as result:
+        point = result.isel(cycle=-1).squeeze(drop=True)
+        volume, error = float(point["worn_volume"]), float(point["worn_volume_error"])
+    # of a slice of 10 mm
+    return volume * (1e14 if row["unit"].endswith("m2") else 1e9), error
+
+
+def benchmark() -> Iterator[Case]:
+    """The studies of `cases`."""
+    with tempfile.TemporaryDirectory() as folder:
+        for row in read_targets():
+            computed, error = run_case(row, Path(folder))
+            name = f"{row['case'].replace('_', ' ')}, {row['asked']}, {row['unit']}"
+            target, known = float(row["target"]), float(row["uncertainty"])
+            yield Case("benchmark", name, row["reference"], target, known, computed, error)
+
+
+RUNGS = (coupon, component, assembly, benchmark)
+
+
 def draw(cases: list[Case]) -> None:
     """Parity: computed over reference of each case, with twice its uncertainty."""
     with style():
         figure = Figure(figsize=(8.0, 0.22 * len(cases) + 0.9), layout="constrained")
         panel = figure.subplots()
         for place, case in enumerate(cases):
-            look = line_style(["coupon", "component", "assembly"].index(case.rung))
+            look = line_style([each.__name__ for each in RUNGS].index(case.rung))
             width = 200.0 * math.hypot(case.u_num, case.u_reference)
             fill = look["color"] if case.passes else "white"
             panel.errorbar(100.0 * case.off, place, xerr=width, fmt=look["marker"], color=look["color"], mfc=fill)
@@ -183,7 +214,7 @@ def draw(cases: list[Case]) -> None:
 
 
 def main() -> None:
-    rungs: dict[str, Callable[[], Iterator[Case]]] = {"coupon": coupon, "component": component, "assembly": assembly}
+    rungs: dict[str, Callable[[], Iterator[Case]]] = {each.__name__: each for each in RUNGS}
     given = arguments(__doc__, list(rungs), page=None)
     table, cases, lines = (
         Table("case", "reference", "computed", "E, %", "u_num, %", "u_D, %", "passed"),
