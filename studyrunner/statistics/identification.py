@@ -11,14 +11,15 @@ changes with the energy. So each history stands for every drawn wear coefficient
 import math
 import tomllib
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from studyrunner.coordinates import SAMPLE
-from studyrunner.measured import QUANTITIES, MeasuredSection, Measurement
+from studyrunner.measured import MeasuredSection
+from studyrunner.statistics.computed import Computed, compute_measured
 from studyrunner.statistics.read_samples import scatter_of
 from studyrunner.statistics.samples import CYCLE, DRAWN, FEWEST, Array
 
@@ -29,7 +30,6 @@ CONFIDENCE = 0.9
 COEFFICIENT = "wear_coefficient"
 _FEWEST_COEFFICIENTS, _MOST_COMBINED, _MOST_ROUNDS = 64, 2**14, 8  # of a history, of all; of closing in
 _NEGLIGIBLE = 1e-6  # weight over the largest one
-_RELATIVE = ("worn_volume", "response_amplitude")  # whose errors in a file are relative
 
 
 class TooFewSamplesError(ValueError):
@@ -37,118 +37,60 @@ class TooFewSamplesError(ValueError):
 
 
 @dataclass(frozen=True)
-class Computed:
-    """What the samples of a result say of one measurement.
+class Weighed:
+    """Samples of a result, weighed by what was measured.
 
-    name: of the quantity. at, measured, deviation (m,): where, and what was measured, SI. slow (m,): cycle count of
-    each value. counts (k,): of the result. values, error (n, k, m or 1): of each sample at each count.
+    dataset: with the samples that count. drawn: values (n,) of each input. computed: of each measurement. levels (r,):
+    wear coefficients, 1/Pa, for which each history stands; None where it is its own. weight (n, r): sum 1.
+    n_without_value: samples of which the file does not hold what was measured. misfit: see `identify`.
     """
 
-    name: str
-    at: Array
-    measured: Array
-    deviation: Array
-    slow: Array
-    counts: Array
-    values: Array
-    error: Array
+    dataset: xr.Dataset
+    drawn: dict[str, Array]
+    computed: tuple[Computed, ...]
+    levels: Array | None
+    weight: Array
+    n_without_value: int
+    misfit: float
 
-    def read(self, sample: int, ratio: Array) -> tuple[Array, Array]:
-        """Values and errors (r, m) of a sample, with the count of each times a ratio (r,); NaN beyond its history."""
+    @property
+    def ratio(self) -> Array:
+        """Counts (n, r) of a history over those for which it stands."""
+        n = len(self.weight)
+        return np.ones((n, 1)) if self.levels is None else self.levels / self.drawn[COEFFICIENT][:, None]
 
-        def at_counts(series: Array) -> Array:
-            columns = np.broadcast_to(series, (len(self.counts), len(self.slow))).T
-            rows = zip(self.slow, columns, strict=True)
-            return np.stack([np.interp(slow * ratio, self.counts, row, np.nan, np.nan) for slow, row in rows], axis=1)
-
-        return at_counts(self.values[sample]), at_counts(self.error[sample])
-
-
-def compute_measured(dataset: xr.Dataset, section: MeasuredSection) -> tuple[Computed, ...]:
-    """What a result says of everything measured. dataset: with one value of each axis but samples, and the one that is
-    measured over.
-
-    Raises ValueError where the result does not hold what was measured, or has further axes.
-    """
-    return tuple(_compute(dataset, name, each) for name, each in section.all)
+    def bands(self, quantile: Array) -> tuple[Array, ...]:
+        """Quantiles (k, q) of each measured quantity: at its places, or over the counts of the file."""
+        found = []
+        for each in self.computed:
+            if each.values.shape[2] == 1:
+                each = replace(each, slow=each.counts)
+            values = np.array([each.read(sample, own)[0] for sample, own in enumerate(self.ratio)])
+            found.append(_bands(values, self.weight, quantile))
+        return tuple(found)
 
 
-def _compute(dataset: xr.Dataset, name: str, measurement: Measurement) -> Computed:
-    at, measured, deviation = measurement.numbers
-    values = _variable(dataset, name, measurement)
-    of_error = QUANTITIES[name].variables[1] if values.name != "wear_depth" else "wear_depth_error"
-    if of_error not in dataset:
-        raise ValueError(f"measured.{name}: the result holds no {of_error}, ask for it by outputs.variables")
-    error = dataset[of_error].astype(float)
-    # an error that is not known: the value says nothing; of nothing worn it is none
-    size = np.abs(values) if values.name in _RELATIVE else xr.ones_like(values)
-    error = (error.fillna(math.inf) * size).where(size != 0.0, 0.0)
-    along = {"x": "contact", "cycle": CYCLE}.get(measurement.over, measurement.over)
-    wanted, arrays = [each for each in (SAMPLE, CYCLE, along) if each in values.dims], []
-    for array in (values, error):
-        reduced = array.max("contact") if "contact" in array.dims and along != "contact" else array
-        reduced = reduced.isel(response=0) if "response" in reduced.dims else reduced
-        if extra := [str(each) for each in reduced.dims if each not in wanted and reduced.sizes[each] > 1]:
-            raise ValueError(f"measured.{name}: select one value of {', '.join(extra)} first")
-        alone = reduced.squeeze([each for each in reduced.dims if each not in wanted], drop=True)
-        arrays.append(measurement.share * alone)
-    counts = dataset[CYCLE].values.astype(float) if CYCLE in values.dims else np.zeros(1)
-    slow = at if measurement.over == "cycle" else np.full(at.shape, _count_of(measurement, name, counts))
-    if slow.max() > counts[-1] * (1.0 + 1e-12):
-        remedy = f"the study ends at {counts[-1]:g} cycles, {slow.max():g} were measured: raise slow_time.cycles"
-        raise ValueError(f"measured.{name}: {remedy}")
-    both = (_placed(dataset, array, along, at, measurement) for array in arrays)
-    return Computed(name, at, measured, deviation, slow, counts, *both)
-
-
-def _count_of(measurement: Measurement, name: str, counts: Array) -> float:
-    default = counts[-1] if name == "profile" else counts[0]
-    return float(default if measurement.cycle is None else measurement.cycle)
-
-
-def _variable(dataset: xr.Dataset, name: str, measurement: Measurement) -> xr.DataArray:
-    """The variable of a result with a measured quantity, of the pairs or the response that are meant."""
-    names = {"profile": ("wear_depth",), "wear_depth": ("wear_depth_max", "wear_depth")}.get(name, (name,))
-    found = next((dataset[each] for each in names if each in dataset), None)
-    if found is None:
-        raise ValueError(f"measured.{name}: the result holds no {names[0]}, ask for it by outputs.variables")
-    if measurement.response:
-        if measurement.response not in dataset["response"].values.tolist():
-            raise ValueError(f"measured.{name}.response: the result has no response {measurement.response!r}")
-        found = found.sel(response=[measurement.response])
-    return found
-
-
-def _placed(dataset: xr.Dataset, array: xr.DataArray, along: str, at: Array, measurement: Measurement) -> Array:
-    """Values (n, k, m or 1) along the samples, the counts, and where a quantity was measured."""
-    for name in (SAMPLE, CYCLE):
-        array = array if name in array.dims else array.expand_dims(name)
-    if along == CYCLE:
-        return np.asarray(array.transpose(SAMPLE, CYCLE).values[..., None], dtype=float)
-    places = dataset[along].values.astype(float) if along != "contact" else dataset["contact_x"].values.astype(float)
-    whole = np.asarray(array.transpose(SAMPLE, CYCLE, along).values, dtype=float)
-    if along == "contact":
-        labels = dataset["contact_surface"].values.astype(str) if "contact_surface" in dataset else None
-        kept = np.full(len(places), fill_value=True)
-        if measurement.surface:
-            kept = kept if labels is None else labels == measurement.surface
-        if not kept.any():
-            raise ValueError(f"measured.profile.surface: the result has no surface {measurement.surface!r}")
-        # pairs side by side across the profile count as one
-        places, inverse = np.unique(places[kept], return_inverse=True)
-        rows = [whole[..., kept][..., inverse == each].mean(axis=-1) for each in range(len(places))]
-        whole = np.stack(rows, axis=-1)
-        mirrored = "x" in str(dataset.attrs.get("contact_mirrored", ""))
-        at = np.abs(at) if mirrored else at
-    if along == "modal_amplitude":
-        places, at = np.log(places), np.log(at)
-    order = np.argsort(places)
-    flat = whole[..., order].reshape(-1, len(places))
-    # beyond the pairs nothing is worn, beyond other ranges nothing is known
-    beyond = 0.0 if along == "contact" else math.nan
-    first = None if along == "contact" and mirrored else beyond
-    inside = [np.interp(at, places[order], row, first, beyond) for row in flat]
-    return np.array(inside).reshape(*whole.shape[:2], len(at))
+def weigh_samples(dataset: xr.Dataset, section: MeasuredSection) -> Weighed:
+    """The samples of a result by what was measured; arguments and errors as `identify`."""
+    study = tomllib.loads(str(dataset.attrs.get("study", "")))
+    inputs = [str(name).removeprefix(DRAWN) for name in dataset.coords if str(name).startswith(DRAWN)]
+    inputs = [name for name in inputs if dataset[f"{DRAWN}{name}"].dims == (SAMPLE,)]
+    if SAMPLE not in dataset.dims or not inputs:
+        raise ValueError("The result holds no samples of inputs: run a study with [scatter].")
+    if not section.all:
+        raise ValueError("Nothing was measured: give [measured] in the study, or an argument.")
+    scatter = scatter_of(dataset)
+    if scatter is not None and scatter.method == "saltelli":
+        # of a base sample two rows are independent
+        dataset = dataset.isel({SAMPLE: np.arange(dataset.sizes[SAMPLE]) % scatter.rows_a_sample < 2})
+    drawn = {name: dataset[f"{DRAWN}{name}"].values.astype(float) for name in inputs}
+    computed = compute_measured(dataset, section)
+    levels, log_likelihood, misfit = _weigh(study, drawn, computed, section.discrepancy)
+    known = np.isfinite(log_likelihood)
+    if not known.any():
+        raise TooFewSamplesError("No sample holds what was measured: raise slow_time.cycles, or look at the outcomes.")
+    weight, without = _normalised(log_likelihood), int((~known).all(axis=1).sum())
+    return Weighed(dataset, drawn, computed, levels, weight, without, misfit)
 
 
 def identify(
@@ -170,46 +112,34 @@ def identify(
     """
     study = tomllib.loads(str(dataset.attrs.get("study", "")))
     section = measured or MeasuredSection.model_validate(study.get("measured") or {}, strict=False)
-    inputs = [str(name).removeprefix(DRAWN) for name in dataset.coords if str(name).startswith(DRAWN)]
-    inputs = [name for name in inputs if dataset[f"{DRAWN}{name}"].dims == (SAMPLE,)]
-    if SAMPLE not in dataset.dims or not inputs:
-        raise ValueError("The result holds no samples of inputs: run a study with [scatter].")
-    if not section.all:
-        raise ValueError("Nothing was measured: give [measured] in the study, or an argument.")
-    scatter = scatter_of(dataset)
-    if scatter is not None and scatter.method == "saltelli":
-        # of a base sample two rows are independent
-        dataset = dataset.isel({SAMPLE: np.arange(dataset.sizes[SAMPLE]) % scatter.rows_a_sample < 2})
-    drawn = {name: dataset[f"{DRAWN}{name}"].values.astype(float) for name in inputs}
-    computed = compute_measured(dataset, section)
-    levels, log_likelihood, misfit = _weigh(study, drawn, computed, section.discrepancy)
-    known = np.isfinite(log_likelihood)
-    if not known.any():
-        raise TooFewSamplesError("No sample holds what was measured: raise slow_time.cycles, or look at the outcomes.")
-    weight = _normalised(log_likelihood)
+    return describe_posterior(weigh_samples(dataset, section), confidence)
+
+
+def describe_posterior(weighed: Weighed, confidence: float = CONFIDENCE) -> xr.Dataset:
+    """What `identify` returns. Raises TooFewSamplesError."""
+    dataset, drawn, weight = weighed.dataset, weighed.drawn, weighed.weight
     of_histories, of_levels = weight.sum(axis=1), weight.sum(axis=0)
     effective = min(1.0 / float((each**2).sum()) for each in (of_histories, of_levels) if each.size > 1)
     # each input with its values and weights
     own = {name: (values, of_histories) for name, values in drawn.items()}
-    if levels is not None:
-        own[COEFFICIENT] = (levels, of_levels)
+    if weighed.levels is not None:
+        own[COEFFICIENT] = (weighed.levels, of_levels)
     if effective < FEWEST_EFFECTIVE:
         raise TooFewSamplesError(_next_round(own, effective))
     quantile = np.array([0.5 - 0.5 * confidence, 0.5, 0.5 + 0.5 * confidence])
-    posterior = [weighted_quantiles(*own[name], quantile) for name in inputs]
+    posterior = [weighted_quantiles(*own[name], quantile) for name in drawn]
     prior = [weighted_quantiles(values, np.ones(values.shape), quantile) for values in drawn.values()]
-    units = [str(dataset[f"{DRAWN}{name}"].attrs.get("units", "")) for name in inputs]
+    units = [str(dataset[f"{DRAWN}{name}"].attrs.get("units", "")) for name in drawn]
     found: dict[str, Any] = {
         "prior_quantile": (("input", "quantile"), np.array(prior)),
         "posterior_quantile": (("input", "quantile"), np.array(posterior)),
         "weight": ((SAMPLE,), of_histories),
         "n_effective": effective,
-        "n_without_value": int((~known).all(axis=1).sum()),
-        "misfit": misfit,
+        "n_without_value": weighed.n_without_value,
+        "misfit": weighed.misfit,
     }
-    ratio = np.ones((len(of_histories), 1)) if levels is None else levels / drawn[COEFFICIENT][:, None]
-    found |= _predicted(dataset, ratio, weight, quantile)
-    coords = {"input": inputs, "quantile": quantile, "input_units": ("input", units)}
+    found |= _predicted(weighed, quantile)
+    coords = {"input": [*drawn], "quantile": quantile, "input_units": ("input", units)}
     coords |= {name: dataset[name] for name in (CYCLE, SAMPLE) if name in dataset.coords}
     return xr.Dataset(found, coords, {"title": "Inputs identified by what was measured", "confidence": confidence})
 
@@ -293,25 +223,29 @@ def _next_round(own: dict[str, tuple[Array, Array]], effective: float) -> str:
     return f"{text}: draw more, or next from {', '.join(ranges)}"
 
 
-def _predicted(dataset: xr.Dataset, ratio: Array, weight: Array, quantile: Array) -> dict[str, Any]:
+def _predicted(weighed: Weighed, quantile: Array) -> dict[str, Any]:
     """Worn volume at the counts of the file, before and with what was measured; nothing of modes."""
+    dataset = weighed.dataset
     if "worn_volume" not in dataset or CYCLE not in dataset["worn_volume"].dims:
         return {}
     volumes = dataset["worn_volume"].squeeze(drop=True).transpose(SAMPLE, CYCLE).values.astype(float)
     counts = dataset[CYCLE].values.astype(float)
-    rows = zip(ratio, volumes, strict=True)
+    rows = zip(weighed.ratio, volumes, strict=True)
     moved = np.array([np.interp(counts * own[:, None], counts, row, np.nan, np.nan) for own, row in rows])
-    own_weight = np.full((len(volumes), 1), 1.0 / len(volumes))
-    found: dict[str, Any] = {}
-    for name, all_of, of in (("prior", volumes[:, None], own_weight), ("posterior", moved, weight)):
-        bands = np.full((len(counts), len(quantile)), np.nan)
-        for place, column in enumerate(np.moveaxis(all_of, -1, 0)):
-            known = np.isfinite(column)
-            held = (of * known).sum(axis=0)
-            # of a coefficient whose histories end earlier those that are long enough stand for all, if they are some
-            enough = known.sum(axis=0) >= FEWEST if of.shape[1] > 1 else held > 1.0 - 0.5 * quantile[0]
-            if of.sum(axis=0)[~enough].sum() < 0.5 * quantile[0]:
-                scale = np.divide(of.sum(axis=0), held, out=np.zeros(held.shape), where=enough & (held > 0.0))
-                bands[place] = weighted_quantiles(column[known], (of * scale)[known], quantile)
-        found[f"{name}_volume"] = ((CYCLE, "quantile"), bands)
-    return found
+    alike = np.full((len(volumes), 1), 1.0 / len(volumes))
+    both = (("prior", volumes[:, None], alike), ("posterior", moved, weighed.weight))
+    return {f"{name}_volume": ((CYCLE, "quantile"), _bands(values, of, quantile)) for name, values, of in both}
+
+
+def _bands(values: Array, weight: Array, quantile: Array) -> Array:
+    """Quantiles (k, q) of values (n, r, k), NaN beyond a history, with weights (n, r)."""
+    bands = np.full((values.shape[-1], len(quantile)), np.nan)
+    for place, column in enumerate(np.moveaxis(values, -1, 0)):
+        known = np.isfinite(column)
+        held = (weight * known).sum(axis=0)
+        # of a coefficient whose histories end earlier those that are long enough stand for all, if they are some
+        enough = known.sum(axis=0) >= FEWEST if weight.shape[1] > 1 else held > 1.0 - 0.5 * quantile[0]
+        if weight.sum(axis=0)[~enough].sum() < 0.5 * quantile[0]:
+            scale = np.divide(weight.sum(axis=0), held, out=np.zeros(held.shape), where=enough & (held > 0.0))
+            bands[place] = weighted_quantiles(column[known], (weight * scale)[known], quantile)
+    return bands

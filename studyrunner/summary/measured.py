@@ -10,7 +10,8 @@ import xarray as xr
 from studyrunner.coordinates import SAMPLE
 from studyrunner.measured import QUANTITIES, MeasuredSection, Measurement
 from studyrunner.result.view import Result
-from studyrunner.statistics.identification import Computed, TooFewSamplesError, compute_measured, identify
+from studyrunner.statistics.computed import Computed, compute_measured
+from studyrunner.statistics.identification import TooFewSamplesError, identify
 from studyrunner.summary.findings import Finding
 from studyrunner.units import show_number, show_percent
 

@@ -13,7 +13,7 @@ from studyrunner.report.contents import draw_report
 from studyrunner.report.drawing import Drawing
 from studyrunner.result.opening import as_history
 from studyrunner.result.view import Result
-from studyrunner.statistics.identification import TooFewSamplesError, identify, weighted_quantiles
+from studyrunner.statistics.identification import TooFewSamplesError, identify, weigh_samples, weighted_quantiles
 from studyrunner.summary.answer import summary
 from studyrunner.user_error import UserError
 from tests.studyrunner.fakes import FACTS
@@ -62,6 +62,9 @@ def test_a_linear_gaussian_problem_has_its_closed_form():
     assert found.posterior_quantile.values[0] == pytest.approx(expected, rel=3e-3)
     assert found.prior_quantile.values[0] == pytest.approx(norm.ppf([0.05, 0.5, 0.95], 3e-18, 0.6e-18), rel=3e-3)
     assert found.posterior_volume.values[-1] == pytest.approx(1e5 * expected, rel=3e-3)
+    section = measure(worn_volume={"at": at, "value": value, "standard_deviation": deviation})
+    (band,) = weigh_samples(result(x[:, None] * COUNTS, {"slope": x}), section).bands(np.array([0.05, 0.5, 0.95]))
+    assert band == pytest.approx(found.posterior_volume.values)
     least = np.sqrt(np.min(((x[:, None] * at - value) ** 2).sum(axis=1)) / 3.0) / deviation
     assert float(found.misfit) == pytest.approx(least)
 
@@ -205,9 +208,19 @@ def test_a_profile_is_compared_along_x():
     )
     at = np.array([-3e-4, -2e-4, -1e-4, 1e-4, 3e-4])
     value = 1.1e-5 * (1.0 - (at / 4e-4) ** 2)
-    found = identify(found_in, measure(profile={"over": "x", "at": at, "value": value, "standard_deviation": 1e-6}))
+    measured = measure(profile={"over": "x", "at": at, "value": value, "standard_deviation": 1e-6})
+    found = identify(found_in, measured)
     assert found.posterior_quantile.values[0, 1] == pytest.approx(1.1e-5, rel=0.03)
     assert "posterior_volume" not in found
+    # samples whose pairs stand elsewhere, as where the size of a contact scatters
+    own = found_in["contact_x"].values * np.linspace(0.9, 1.1, n)[:, None]
+    moved = scale[:, None, None] * (COUNTS[:, None] / 1e5) * (1.0 - (own[:, None] / 4e-4) ** 2)
+    moved = found_in.assign(wear_depth=(("sample", "cycle", "contact"), moved))
+    elsewhere = identify(moved.assign_coords(contact_x=(("sample", "contact"), own)), measured)
+    assert elsewhere.posterior_quantile.values == pytest.approx(found.posterior_quantile.values, rel=0.03)
+    # the band of the figure
+    (band,) = weigh_samples(found_in, measured).bands(found["quantile"].values)
+    assert band == pytest.approx(np.outer(value / 1.1e-5, found.posterior_quantile.values[0]))
 
 
 # --- the end of a run, and the page ---
@@ -246,9 +259,11 @@ def test_the_end_of_a_run_says_what_was_identified_or_why_nothing_was():
 @pytest.mark.parametrize("scatter", [None, {"samples": 64, "friction_coefficient": {"normal": {"std": 0.05}}}])
 def test_the_page_shows_both(scatter):
     shown = Result("made.nc", as_history(made(**({"scatter": scatter} if scatter else {})))[0])
-    names = [item.name for item in draw_report(shown) if isinstance(item, Drawing)]
-    assert "measured" in names
-    assert ("identified" in names) == (scatter is not None)
+    drawn = {item.name: item for item in draw_report(shown) if isinstance(item, Drawing)}
+    assert ("identified" in drawn) == (scatter is not None)
+    _, labels = drawn["measured"].figure.axes[0].get_legend_handles_labels()
+    bands = ["drawn", "with what was measured"] if scatter else ["computed"]
+    assert labels == [*bands, "measured"]
 
 
 # --- files ---

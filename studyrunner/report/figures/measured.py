@@ -3,7 +3,6 @@
 from typing import Any
 
 import numpy as np
-import xarray as xr
 from matplotlib.axes import Axes
 
 from studyrunner.coordinates import SAMPLE
@@ -11,7 +10,15 @@ from studyrunner.measured import QUANTITIES, Measurement
 from studyrunner.report import drawing as plot
 from studyrunner.report.drawing import COLOURS, Drawn
 from studyrunner.result.view import Result
-from studyrunner.statistics.identification import Computed, compute_measured, identify, weighted_quantiles
+from studyrunner.statistics.computed import Computed, compute_measured
+from studyrunner.statistics.identification import (
+    TooFewSamplesError,
+    describe_posterior,
+    identify,
+    weigh_samples,
+    weighted_quantiles,
+)
+from studyrunner.statistics.samples import Array
 from studyrunner.units import scale_for
 
 _OVER = {"cycle": "cycles", "x": "m", "frequency": "Hz", "modal_amplitude": "m sqrt(kg)"}
@@ -21,31 +28,31 @@ _LOOK: dict[str, Any] = {"color": "black", "linestyle": "none", "capsize": 2.5, 
 
 def draw_measured(result: Result) -> Drawn:
     """A panel for each measured quantity: measured values with their deviations beside computed ones, of samples bands
-    of 90 %, before and, of worn volumes, with what was measured.
+    of 90 %, before and with what was measured.
     """
     section = result.measurements
     if section is None:
         return None
     dataset = result.at_one_point(*(each.over for _, each in section.all))
-    has_samples, posterior, why = SAMPLE in result.varying, None, ""
+    why, bands = "", tuple[Array, ...]()
     try:
         computed = compute_measured(dataset, section)
-        posterior = identify(dataset) if has_samples else None
-    except ValueError as error:
+        if SAMPLE in result.varying:
+            weighed = weigh_samples(dataset, section)
+            describe_posterior(weighed)
+            bands = weighed.bands(_ENDS)
+    except TooFewSamplesError as error:
         why = str(error)
-        if not has_samples:
-            return why
-        computed = compute_measured(dataset, section) if "effective" in why else ()
-    if not computed:
-        return why
+    except ValueError as error:
+        return str(error)
     figure, panels = plot.new_panels(1, len(computed), 3.0)
-    for panel, each, (_, measurement) in zip(panels[0], computed, section.all, strict=True):
-        _draw(panel, each, measurement, posterior)
+    for place, (panel, each, (_, measurement)) in enumerate(zip(panels[0], computed, section.all, strict=True)):
+        _draw(panel, each, measurement, bands[place] if bands else None)
     return figure, why
 
 
-def _draw(panel: Axes, computed: Computed, measurement: Measurement, posterior: xr.Dataset | None) -> None:
-    """One quantity over its places, or over the cycles of the file."""
+def _draw(panel: Axes, computed: Computed, measurement: Measurement, posterior: Array | None) -> None:
+    """One quantity over its places, or over the cycles of the file. posterior (k, 3): band with what was measured."""
     over = measurement.over
     along_counts = computed.values.shape[2] == 1
     at = computed.counts if along_counts else computed.at
@@ -61,9 +68,8 @@ def _draw(panel: Axes, computed: Computed, measurement: Measurement, posterior: 
         known = [column[np.isfinite(column)] for column in values.T]
         prior = np.array([weighted_quantiles(each, np.ones(each.shape), _ENDS) for each in known])
         bands = [("drawn", prior, COLOURS[0])]
-        if posterior is not None and computed.name == "worn_volume" and "posterior_volume" in posterior:
-            known_now = measurement.share * posterior["posterior_volume"].values
-            bands.append(("with what was measured", known_now, COLOURS[1]))
+        if posterior is not None:
+            bands.append(("with what was measured", posterior, COLOURS[1]))
         for label, band, colour in bands:
             panel.fill_between(x, scale(band[:, 0]), scale(band[:, 2]), color=colour, alpha=0.25, lw=0.0, label=label)
             panel.plot(x, scale(band[:, 1]), color=colour, label=f"_{label}")
