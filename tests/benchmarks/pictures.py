@@ -45,6 +45,7 @@ WIDTH, COLOURS = 1200, 128  # of a picture: pixels, and of its palette
 SMALL = 720  # pixels of a picture of `GALLERY`
 GALLERY = {
     "blade_root": "worn_root",
+    "bolted_beam": "damping_ratio",
     "cylinder_on_flat": "worn_profile",
     "damper": "worn_root",
     "extremes": "outcome_map",

@@ -21,6 +21,7 @@ from tests.studyrunner.small_studies import compute
 pytestmark = [pytest.mark.usefixtures("folder"), pytest.mark.slow]
 
 SMALL = {
+    "bolted_beam": "axes.modal_amplitude=[1e-5,3e-5]",
     "cylinder_on_flat": "scene.strips=24 solver.harmonics=3 solver.samples=64",
     "sphere_on_flat": "scene.patches=4 slow_time.cycles=1e4 slow_time.outputs=3 solver.harmonics=3 solver.samples=64",
     "damper": "axes.nodal_diameter=8 slow_time.cycles=10000 slow_time.outputs=3",
@@ -54,6 +55,13 @@ def wears_near_its_resonance_only(result):
 def rises_first_and_falls_later(result):
     first, *_, highest, last = result.excitation_frequency.values.ravel()
     assert first < last < highest - 0.1
+
+
+def softens_and_is_damped_where_it_slips(result):
+    (sticks, slips), damping = result.natural_frequency.values.ravel(), result.damping_ratio.values.ravel()
+    assert slips < sticks - 0.5
+    # the loss factor alone while all pairs stick
+    assert damping[0] < 5e-4 < 3e-3 < damping[1]
 
 
 def has_two_branches(result):
@@ -101,6 +109,7 @@ def resonates_between_a_free_and_a_stuck_wedge(result):
 
 
 SHOWN = {
+    "bolted_beam": softens_and_is_damped_where_it_slips,
     "scatter": wears_in_each_sample_another_volume,
     "mission": wears_in_run_up_and_dwells,
     "modes": resonates_lower_the_more_it_is_worn,
