@@ -26,8 +26,9 @@ def test_the_page_has_all_targets():
             assert word in row
 
 
+# partial slip is that of the half-space scenes, at twice their size
 @pytest.mark.slow
-@pytest.mark.parametrize("name", TARGETS)
+@pytest.mark.parametrize("name", sorted({*TARGETS} - {"partial_slip"}))
 def test_a_case_comes_out_within_its_tolerance(name, tmp_path):
     computed, error = run_case(TARGETS[name], tmp_path)
     target, tolerance = float(TARGETS[name]["target"]), float(TARGETS[name]["tolerance"])
