@@ -18,7 +18,9 @@ N_MODES = 6
 """Number of natural frequencies that are given for each nodal diameter."""
 
 Progress = Callable[[str], None]
-"""Takes a line on the next step, where a step may take long."""
+"""Takes a line on the next step, where a step may take long, or one on the model that begins with `WARNING`."""
+
+WARNING = "warning: "
 
 
 def silent(_: str) -> None:

@@ -14,7 +14,7 @@ from typing import TypeVar
 from solver.model import ReducedModel
 from solver.packing import Packed, pack, unpack_model
 from studies.model_check import check_model
-from studies.scene import Progress
+from studies.scene import WARNING, Progress
 from studies.scene_error import SceneError
 from studyrunner.checkpoint.store import COMPUTED, UNREADABLE, Store
 from studyrunner.kinds.task import Task
@@ -97,13 +97,14 @@ class SceneBuilt:
     """A scene that was built.
 
     facts: None where the scene is wrong. variables: what the study asks of the scene. model: None where it is
-    from an earlier run. error: what the user has to change.
+    from an earlier run. error: what the user has to change. warnings: what the user should know of the model.
     """
 
     facts: SceneFacts | None
     variables: tuple[answers.SmallArray, ...] = ()
     model: Packed | None = None
     error: UserError | None = None
+    warnings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -144,7 +145,8 @@ def build_scenes(ranks: Ranks, study: Study, store: Store, say: Progress) -> Sce
         facts = tuple(each.facts for each in built if each.facts is not None)
         variables, notes = answers.join_scene_variables(scenes, [each.variables for each in built])
         stored = answers.scene_to_store(scenes.studies[0], building.read(0)) if len(built) == 1 else None
-    models = SceneModels(building.read, store.path)
+        warnings = dict.fromkeys(text for each in built for text in each.warnings)
+    models, notes = SceneModels(building.read, store.path), (*notes, *warnings)
     return Scenes(scenes, facts, (*variables, *answers.exact_answers(study)), stored, notes, models)
 
 
@@ -188,7 +190,11 @@ class _Building(TaskHandler):
 
 def build_scene_task(task: SceneTask, progress: Progress) -> Iterator[SceneBuilt]:
     """Builds one scene, or takes its model from an earlier run, which is equal to the last bit (`solver.packing`)."""
-    known = None
+    known, warnings = None, list[str]()
+
+    def say(text: str) -> None:
+        warnings.append(text) if text.startswith(WARNING) else progress(text)
+
     # what is damaged, altered, or of another version, is built again
     with contextlib.suppress(*UNREADABLE, SceneError):
         if task.known is not None:
@@ -196,9 +202,10 @@ def build_scene_task(task: SceneTask, progress: Progress) -> Iterator[SceneBuilt
             check_model(model)
             known = model
     try:
-        model = build_study_scene(task.study, progress, known)
-        variables = answers.build_scene_variables(task.study, model, progress)
+        model = build_study_scene(task.study, say, known)
+        variables = answers.build_scene_variables(task.study, model, say)
     except UserError as error:
         yield SceneBuilt(None, error=error)
         return
-    yield SceneBuilt(describe_scene(model), variables, pack(model) if known is None else None)
+    packed = pack(model) if known is None else None
+    yield SceneBuilt(describe_scene(model), variables, packed, warnings=tuple(warnings))

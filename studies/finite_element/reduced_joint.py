@@ -13,7 +13,7 @@ from studies.finite_element.elimination import rounding_of
 from studies.finite_element.pairing import ContactPairs
 from studies.finite_element.reduction import PreparedModel
 from studies.finite_element.structure import FeModel, JointDefinition, ReductionOptions, Structure, build_structure
-from studies.scene import Progress, silent
+from studies.scene import WARNING, Progress, silent
 from studies.scene_error import SceneError
 
 ABOVE = 1.001
@@ -94,6 +94,8 @@ def prepare_model(model: FeModel, joint: JointDefinition, progress: Progress = s
     """Pairs and matrices of a model. Raises SceneError where the model describes no possible joint."""
     progress("pairing of the contact surfaces")
     mesh, rotation, structure, forms = model.mesh, model.rotation, build_structure(model, joint), model.forms
+    for note in structure.notes:
+        progress(WARNING + note)
     if forms is None:
         progress("assembly of stiffness and mass")
         solid_mesh.check_elements(mesh)

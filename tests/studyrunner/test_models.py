@@ -18,9 +18,10 @@ from solver.outcome import Outcome
 from studies.fe_models.from_files import model as scene_of_files
 from studies.finite_element.solid_mesh import Material
 from studies.finite_element.surfaces import surface_of_nodes
-from studies.scene import stuck_frequencies
+from studies.scene import silent, stuck_frequencies
 from studyrunner.cli import main
 from studyrunner.scene.scene import build_study_scene, describe_scene
+from studyrunner.scene_building import SceneTask, build_scene_task
 from studyrunner.study.study_file import read_study
 from studyrunner.user_error import UserError
 from tests.mpi.launching import results
@@ -350,3 +351,10 @@ def test_static_forces_are_those_of_the_contact_of_calculix():
     result = compute("blade_root", "still.nc", "axes.excitation_amplitude=1e-3", *UNWORN)
     found = (result.mean_pressure * result.contact_area).values.reshape(2, 18).sum(axis=1)
     assert found == pytest.approx(2 * [-normal], rel=3e-3)
+
+
+@pytest.mark.slow
+def test_a_run_warns_of_nodes_that_are_not_tied():
+    (built,) = build_scene_task(SceneTask(0, read_study("bolted_beam")), silent)
+    assert len(built.warnings) == 6
+    assert all("12 of 28 nodes" in each and "not tied" in each for each in built.warnings)
