@@ -5,7 +5,7 @@
 The dovetail on mesh 1 at 212.75 Hz wears for 3e5 cycles, with scattered wear coefficient and friction. Of the samples
 three quarters identify; each of the others is the truth of some of 100 draws: its worn volumes at four counts, with 8 %
 of noise, are what was measured. Wanted: of the draws in which something is identified, 90 % have the truth within its
-interval of 90 %, each input by itself. A result that is there is read. 20 CPU minutes.
+interval of 90 %, each input by itself. A result that is there is read. 25 CPU minutes.
 """
 
 import tempfile
