@@ -294,17 +294,24 @@ class Linearisation:
 
     def matrices(self, pairs: IntArray, width: int | None = None) -> FloatArray:
         """`du/dp`, m/N, and `dlambda/dp` (2, n, k, n k) of the n displacements of some pairs; order as in `dense`."""
-        m = self.joint.basis.synthesis.shape[0]
-        k, rows = width or m, self.joint.rows_of(pairs)
+        m, rows = self.joint.basis.synthesis.shape[0], self.joint.rows_of(pairs)
         pair, component = np.divmod(self.joint.component_index[rows], 3)
-        pair = np.searchsorted(pairs, pair)
-        # blocks of the pairs, spread over the existing rows and columns: (row, coefficient, column, coefficient)
-        spread = np.zeros((2, rows.size, k, rows.size, k))
-        row, column = np.nonzero(pair[:, None] == pair[None, :])
-        for place, part in enumerate((self.motion_tangent, self.force_tangent)):
-            blocks = part[pairs].reshape(pairs.size, 3, m, 3, m)[:, :, :k, :, :k]
-            spread[place][row, :, column] = blocks[pair[row], component[row], :, component[column]]
-        return spread.reshape(2, rows.size, k, rows.size * k)
+        blocks = self.motion_tangent[pairs], self.force_tangent[pairs]
+        return spread_blocks(np.array(blocks), np.searchsorted(pairs, pair), component, width or m)
+
+
+def spread_blocks(blocks: FloatArray, pair: IntArray, component: IntArray, width: int) -> FloatArray:
+    """Blocks (2, p, 3m, 3m) of pairs over the rows and columns (n,) of existing displacements (2, n, k, n k).
+
+    pair, component (n,): of each displacement. width: k, the first coefficients of m.
+    """
+    n, m = pair.size, blocks.shape[2] // 3
+    spread = np.zeros((2, n, width, n, width))
+    row, column = np.nonzero(pair[:, None] == pair[None, :])
+    for place, part in enumerate(blocks):
+        each = part.reshape(-1, 3, m, 3, m)[:, :, :width, :, :width]
+        spread[place][row, :, column] = each[pair[row], component[row], :, component[column]]
+    return spread.reshape(2, n, width, n * width)
 
 
 @njit(cache=True)

@@ -13,6 +13,7 @@ from solver.harmonic_balance.dlft import Linearisation
 from solver.model import ComplexArray, FloatArray, IntArray
 from solver.newton.krylov import build_correction, ritz_values, solve_gmres
 from solver.newton.period_preconditioner import PeriodFactor, build_period_factor
+from solver.newton.ring_factor import RingFactor, build_ring_factor
 from solver.settings import Resolution, SolverSettings
 
 FORCING = 1e-3
@@ -90,7 +91,7 @@ class DenseFactor:
         return found
 
 
-Factor = DenseFactor | PeriodFactor
+Factor = DenseFactor | PeriodFactor | RingFactor
 
 
 def build_dense_factor(tangent: Linearisation, shift: float) -> DenseFactor:
@@ -118,13 +119,13 @@ class JacobianSolver:
         return self._factor if self._resolution == tangent.joint.resolution else None
 
     def _renewed(self, tangent: Linearisation, *, dense: bool = False) -> Factor:
-        """A factorisation of this Jacobian, kept from now on: a march through the period, or dense factors, if wanted,
-        for small joints, masses, and where a sample is singular.
+        """A factorisation of this Jacobian, kept from now on: of the waves of a ring, a march through the period, or
+        dense factors, if wanted, for small joints, masses, and where a sample is singular.
         """
         self._resolution, self._corrections = tangent.joint.resolution, ()
         dense = dense or tangent.joint.component_index.size <= SMALL_JOINT
-        march = None if dense else build_period_factor(tangent)
-        self._factor = march or build_dense_factor(tangent, NEUTRAL_SHIFT)
+        rough = None if dense else build_ring_factor(tangent, NEUTRAL_SHIFT) or build_period_factor(tangent)
+        self._factor = rough or build_dense_factor(tangent, NEUTRAL_SHIFT)
         return self._factor
 
     def solve(
@@ -229,7 +230,7 @@ class JacobianSolver:
         if known is not None and not known.exact:
             yield known
         yield self._renewed(tangent)
-        if isinstance(self._factor, PeriodFactor):
+        if not isinstance(self._factor, DenseFactor):
             yield self._renewed(tangent, dense=True)
 
 

@@ -7,9 +7,11 @@ import pytest
 from scipy.optimize import minimize
 
 from solver.arguments import check_case
+from solver.contact.coulomb import SLIP
 from solver.forced_response import balance_at_start, frequency_response
 from solver.histories import march_wear
 from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel
+from solver.newton import ring_factor
 from solver.nonlinear_modes import backbone
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
@@ -110,6 +112,25 @@ def test_a_step_in_time_is_that_of_the_assembled_matrices():
     )
     for one, other in ((still, by_still), (moving.dense, by_moving.dense), (force, by_force)):
         assert np.abs(one - other).max() <= 1e-9 * np.abs(other).max()
+
+
+@pytest.mark.parametrize("largest", [1000, 14])
+def test_equal_sectors_in_one_state_are_inverted_exactly_by_waves(largest, monkeypatch):
+    monkeypatch.setattr(ring_factor, "LARGEST_WAVE", largest)
+    settings = SolverSettings(harmonics=5, samples=64)
+    checked = check_case(build_ring(one_sector(1)), 3.3, 0.3, "up", settings)
+    _, _, balance, state = balance_at_start(checked[0], checked[1], 280.0, "up", settings)
+    tangent = balance.linearise(state.evaluation)
+    assert (state.evaluation.status_t == SLIP).any(axis=1).all()
+    factor = ring_factor.build_ring_factor(tangent, 0.0)
+    right = np.random.default_rng(7).normal(size=state.evaluation.predicted_h.shape)
+    # single precision; with the highest harmonics left out it is the inverse of all others alone
+    width = factor.width
+    assert width == (11 if largest == 1000 else 7)
+    dense = np.linalg.inv(tangent.dense(np.arange(N), width)) @ right[:, :width].ravel()
+    assert np.abs(factor.solve(right)[:, :width].ravel() - dense).max() <= 1e-3 * np.abs(dense).max()
+    assert np.array_equal(factor.solve(right)[:, width:], right[:, width:])
+    assert factor.sign == np.linalg.slogdet(tangent.dense(np.arange(N), width))[0]
 
 
 def test_a_force_on_one_blade_is_that_of_the_full_matrices():
