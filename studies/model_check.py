@@ -96,6 +96,8 @@ def _check_linear(linear: LinearModel, prefix: str, n_response: int) -> None:
         "load/harmonic": (linear.load_harmonic, (n,)),
         "response/dofs": (linear.response, (n_response, n)),
     }
+    if linear.blade is not None:
+        parts["blade"] = linear.blade, (*linear.blade.shape[:1], n)
     # all shapes before any number: what does not fit together takes no time
     for name, (values, shape) in parts.items():
         _check_shape(prefix + name, values, shape)

@@ -36,7 +36,7 @@ CONTACT = {
     "surface": "text",
 }
 """Fields of the contact pairs, and what their numbers are."""
-LINEAR = ("mass", "damping", "stiffness", "load/static", "load/harmonic", "response/dofs", "response/names")
+LINEAR = ("mass", "damping", "stiffness", "blade", "load/static", "load/harmonic", "response/dofs", "response/names")
 LAWS: dict[str, tuple[Callable[..., PairLaw], tuple[str, ...]]] = {
     "springs": (CubicSprings, ("linear", "cubic")),
     "iwan": (IwanJoints, ("stiffness", "limit", "normal_stiffness")),
@@ -202,6 +202,7 @@ def _read_linear(datasets: Datasets, prefix: str, *, real: bool) -> LinearModel:
         load_static=read_dataset(datasets, f"{prefix}load/static", "real"),
         load_harmonic=read_dataset(datasets, f"{prefix}load/harmonic", "any").astype(np.complex128),
         response=response,
+        blade=matrix("blade") if f"{prefix}blade" in datasets else None,
     )
 
 
@@ -283,7 +284,10 @@ def scene_datasets(model: ReducedModel, mesh: SurfaceMesh | None) -> Iterator[tu
     for k, linear in model.linear.items():
         prefix = f"nd/{k}/" if is_grouped(model) else ""
         for name in LINEAR[:-1]:  # "load/static" is `load_static`, "response/dofs" is `response`
-            yield prefix + name, getattr(linear, name.replace("/", "_").removesuffix("_dofs"))
+            values = getattr(linear, name.replace("/", "_").removesuffix("_dofs"))
+            # not every sector knows the modes of its blade
+            if values is not None:
+                yield prefix + name, values
         yield f"{prefix}response/names", np.array(model.response_names, dtype=np.str_)
     if mesh is not None:
         for column, axis in enumerate("xyz"):

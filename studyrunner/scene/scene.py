@@ -198,6 +198,8 @@ def _parts(model: ReducedModel) -> Iterator[tuple[str, object]]:
     for nodal_diameter, linear in sorted(model.linear.items()):
         for name in ("mass", "damping", "stiffness", "load_static", "load_harmonic", "response"):
             yield f"{nodal_diameter} {name}", getattr(linear, name)
+        if linear.blade is not None:
+            yield f"{nodal_diameter} blade", linear.blade
     for name in ("dofs", "area", "gap", "normal_load", "position"):
         yield name, getattr(model.contact, name)
     for name in ("friction_coefficient", "edge"):

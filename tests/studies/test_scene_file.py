@@ -33,6 +33,15 @@ def with_pairs(**values):
     return replace(model, contact=replace(model.contact, **values))
 
 
+def with_blade(model):
+    """Of a ring: with the modes of the blade in the displacements of each nodal diameter."""
+    random = np.random.default_rng(4)
+    blades = {
+        k: random.normal(size=(2, len(each.mass))) * (1.0 + 0.5j if k else 1.0) for k, each in model.linear.items()
+    }
+    return replace(model, linear={k: replace(each, blade=blades[k]) for k, each in model.linear.items()})
+
+
 LAWS = CubicSprings((0,), [1.0, 2.0, 0.1 + 0.2], [0.0, 0.0, 3.0]), IwanJoints((1,), 4.0, 5.0, 0.0)
 
 
@@ -45,6 +54,7 @@ MODELS = {
     "sector": sector(),
     "rough": with_pairs(friction_coefficient=np.array([0.0, 0.1 + 0.2, 1.5])),
     "open ended": with_pairs(edge=np.array([False, True, True])),
+    "ring": with_blade(sector()),
 }
 
 
@@ -203,6 +213,8 @@ WRONG = [
     (plain, attribute("nodal_diameter", 1), "nodal_diameter"),
     (sector, not_hermitian, "nd/2/stiffness"),
     (sector, drop("nd/2"), "nd/2"),
+    (sector, put("nd/2/blade", np.ones((2, 6))), "nd/2/blade"),
+    (sector, put("nd/0/blade", 1.0), "nd/0/blade"),
     (sector, put("nd/2/response/names", ["tip", "other"]), "nd/2/response/names"),
     (sector, put("nd/0/stiffness", COMPLEX), "nd/0/stiffness"),
     (sector, lambda file: file.copy("nd/2", "nd/4"), "nd/4"),
