@@ -20,12 +20,12 @@ from studies.scene import (
     Progress,
     Scene,
     SurfaceMesh,
-    Table,
     as_scene,
     make_compliant,
     stuck_frequencies,
 )
 from studies.scenes import build_scene, scene_parameters
+from studies.sectors import OfRing
 
 Check = tuple[list[tuple[str, str]], Callable[[Path], None]]
 """Label and text of each line on a finite-element model, and what draws its contact pairs."""
@@ -83,6 +83,10 @@ class SceneSource(ABC):
         given: dict[str, Any] = parameters.model_dump(mode="json")
         if not isinstance(given["friction_coefficient"], dict):
             del given["friction_coefficient"]
+        if isinstance(parameters, OfRing):
+            # the model is that of a sector of a ring, however its sectors differ
+            del given["sectors"], given["forced_sector"]
+            given |= {"sectors": "all"} if parameters.ring else {}
         return given
 
     def key(self, parameters: BaseModel) -> tuple[object, ...]:
@@ -186,10 +190,10 @@ class Bundled(SceneSource):
         return parameters if self.held else as_scene(parameters).with_room_for_wear(expected)
 
 
-class SceneFileParameters(Table):
+class SceneFileParameters(OfRing):
     """[scene] of a scene file: the friction coefficient only, if the file has none for each pair."""
 
-    AXES: ClassVar = ("friction_coefficient", "contact_stiffness")
+    AXES: ClassVar = ("friction_coefficient", "contact_stiffness", "forced_sector")
 
     friction_coefficient: float | None = Field(None, ge=0, description="of all pairs")
     contact_stiffness: ContactStiffness = None

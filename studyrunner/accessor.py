@@ -22,7 +22,7 @@ from studyrunner.study.text import read_toml
 from studyrunner.summary.answer import Summary, summary
 from studyrunner.user_error import UserError
 
-_SELECTED = ("cycle", "mission", "block", "contact", "response")
+_SELECTED = ("cycle", "mission", "block", "contact", "response", "sector")
 """Dimensions behind the axes, in their order, that a selection may take off."""
 _PAIRS = ("contact", "contact_x", "contact_y", "contact_z", "contact_surface")
 

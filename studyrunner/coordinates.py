@@ -80,6 +80,7 @@ COORDINATES = {
     "response": Variable((), "1", "name of the response"),
     "phase": Variable((), "rad", "phase of the excitation", "omega t, 0 where a real harmonic load has its maximum."),
     "component": Variable((), "1", "component of relative displacement and contact force in the frame of the pair"),
+    "sector": Variable((), "1", "number of the sector of the ring"),
     "nodal_diameter": Variable((), "1", "nodal diameter"),
     "mode": Variable((), "1", "number of the mode, by frequency"),
     **{
@@ -96,6 +97,13 @@ COORDINATES = {
         " few pairs that all lie at its edge, as on the coarsest mesh.",
         dtype="int8",
         flags=("inside", "edge", "not_known"),
+    ),
+    "contact_sector": Variable(("contact",), "1", "sector of the ring that the contact pair is in", dtype="int32"),
+    "sector_frequency": Variable(
+        ("sector",),
+        "1",
+        "relative deviation of the blade-alone frequency",
+        "Key scene.sectors; where it scatters, what the samples draw is in sample_sector_frequency.",
     ),
     "contact_exists": Variable(
         ("contact",),

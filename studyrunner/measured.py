@@ -51,7 +51,7 @@ FEWEST_OF_PROFILE = 5
 
 _ABSCISSAS = {"cycle": "1", "x": "m", "frequency": "Hz", "modal_amplitude": "m_sqrtkg"}
 _LENGTHS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6, "nm": 1e-9}
-_UNITS: Mapping[str, Mapping[str, float]] = {
+UNITS: Mapping[str, Mapping[str, float]] = {
     "1": {"": 1.0, "percent": 1e-2},
     "m": _LENGTHS,
     "m3": {f"{unit}3": size**3 for unit, size in _LENGTHS.items()},
@@ -182,15 +182,15 @@ def read_columns(path: Path, name: str) -> dict[str, object]:
 
     name: of `QUANTITIES`. Raises UserError with file and row.
     """
-    table, quantity = _read_table(path), QUANTITIES[name]
+    table, quantity = read_table(path), QUANTITIES[name]
     column, found, over = quantity.column or name, dict[str, NDArray[np.float64]](), ""
     names = table.dtype.names or ()
     units: dict[str, str] = {each: _ABSCISSAS[each] for each in quantity.over}
     units |= {column: quantity.units, "standard_deviation": quantity.units}
     for header, (wanted, of) in product(names, units.items()):
         match = re.fullmatch(rf"{wanted}s?_?(.*)", header, re.IGNORECASE)
-        if match and match[1] in _UNITS[of]:
-            found[wanted] = table[header] * _UNITS[of][match[1]]
+        if match and match[1] in UNITS[of]:
+            found[wanted] = table[header] * UNITS[of][match[1]]
             over = wanted if wanted in _ABSCISSAS else over
     if not over or column not in found:
         possible = " or ".join(_header(each, _ABSCISSAS[each]) for each in quantity.over)
@@ -207,11 +207,11 @@ def read_columns(path: Path, name: str) -> dict[str, object]:
 
 
 def _header(name: str, units: str) -> str:
-    shown = [unit for unit in _UNITS[units] if unit and unit != "µm" and not unit.startswith("µ")]
+    shown = [unit for unit in UNITS[units] if unit and unit != "µm" and not unit.startswith("µ")]
     return f"{name}_{' or _'.join(shown)}" if units != "1" else name
 
 
-def _read_table(path: Path) -> NDArray[Any]:
+def read_table(path: Path) -> NDArray[Any]:
     """The columns of a CSV file, by their names."""
     try:
         lines = path.read_text(encoding="utf-8-sig").replace('"', "").splitlines()

@@ -88,7 +88,8 @@ def _of_study(
     n_contact = facts.contact.n_contact
     contact = f"{count(n_contact, 'contact pair')} with {count(facts.n_displacements, 'relative displacement')}"
     yield "study", f"{study.study.name}: {study.study.title}".rstrip(": ")
-    yield "scene", f"{study.scene.model}: {contact}, {count(len(facts.response_names), 'response')}"
+    ring = f"ring of {facts.n_ring} sectors, " if study.scene.ring else ""
+    yield "scene", f"{study.scene.model}: {ring}{contact}, {count(len(facts.response_names), 'response')}"
     if len(of_scenes) > 1:
         fewest = min(each.contact.n_contact for each in of_scenes)
         pairs = f"{fewest} to " * (fewest < n_contact) + count(n_contact, "contact pair")

@@ -17,10 +17,13 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 Method = Literal["sobol", "latin_hypercube", "random", "saltelli"]
-Of = Literal["all pairs", "each surface", "each pair"]
+Of = Literal["all pairs", "each sector", "each surface", "each pair"]
 
 OF_PAIRS = ("area", "friction_coefficient", "gap")
 """Inputs that may differ between the contact pairs; named as in a scene file."""
+
+SECTOR_FREQUENCY = "sector_frequency"
+"""Input of each sector of a ring: the relative deviation of the blade-alone frequency."""
 
 _ABOVE_ZERO = ("area", "excitation_amplitude", "frequency")
 _NOT_BELOW_ZERO = ("friction_coefficient", "surfaces_", "threshold", "adhesive", "decay", "wear_coefficient")
@@ -180,8 +183,8 @@ class ScatterSection(Section):
         if not self.inputs:
             remedy = "name what scatters, as friction_coefficient = {normal = {std = 0.03}}, or leave out [scatter]"
             yield Wrong("samples", self.samples, remedy)
-        for name, each in self.inputs.items():
-            if each.of != "all pairs" and name not in OF_PAIRS:
+        for name, each in self.__pydantic_extra__.items():
+            if each.of != "all pairs" and name not in OF_PAIRS and (name, each.of) != (SECTOR_FREQUENCY, "each sector"):
                 yield Wrong(f"{name}.of", each.of, f"leave it out: only {', '.join(OF_PAIRS)} differ between pairs")
             if each.correlation_length is not None and each.of != "each pair":
                 yield Wrong(f"{name}.correlation_length", each.correlation_length, 'give of = "each pair" beside it')
@@ -189,14 +192,16 @@ class ScatterSection(Section):
     @property
     def inputs(self) -> dict[str, Scattered]:
         """The inputs that scatter, in the order of their columns in a design: those of pairs last, else by name."""
-        order, extra = get_args(Of), self.__pydantic_extra__
+        order, extra = get_args(Of), dict(self.__pydantic_extra__)
+        if SECTOR_FREQUENCY in extra:
+            extra[SECTOR_FREQUENCY] = extra[SECTOR_FREQUENCY].model_copy(update={"of": "each sector"})
         return {name: extra[name] for name in sorted(extra, key=lambda name: (order.index(extra[name].of), name))}
 
     @property
     def of_pairs(self) -> tuple[str, ...]:
-        """Inputs that belong to contact pairs: gaps, areas, a friction coefficient with draws of its own."""
+        """Inputs that belong to contact pairs, as a friction coefficient with draws of its own, or to sectors."""
         of_all = {name for name, each in self.inputs.items() if each.of == "all pairs"} & {"friction_coefficient"}
-        return tuple(name for name in self.inputs if name in OF_PAIRS and name not in of_all)
+        return tuple(name for name in self.inputs if name in (*OF_PAIRS, SECTOR_FREQUENCY) and name not in of_all)
 
     @property
     def rows_a_sample(self) -> int:
@@ -227,19 +232,24 @@ def flat_table(table: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def draw(
-    section: ScatterSection, own_values: Mapping[str, ArrayLike], pairs: "ContactInterface | None" = None
+    section: ScatterSection,
+    own_values: Mapping[str, ArrayLike],
+    pairs: "ContactInterface | None" = None,
+    n_sectors: int = 1,
 ) -> dict[str, Array]:
     """What the samples draw of each input that is the same for all pairs, (samples,) or (n_values, samples) of an axis;
-    with pairs of each input that belongs to them, (samples, n_pairs). Without width the study's own values, exactly.
+    with pairs of each input that belongs to them, (samples, n_pairs), or to sectors, (samples, n_sectors). Without
+    width the study's own values, exactly.
 
     own_values: of the study: a number, (n_values, 1) of an axis, (n_pairs,) of pairs; not needed for an absolute
-    distribution. Raises Wrong where physics forbids a draw, positions are missing, or a width
-    is a share of 0.
+    distribution. n_sectors: to which pairs belong one after the other. Raises Wrong where physics forbids a draw,
+    positions are missing, or a width is a share of 0.
     """
     from scipy.special import ndtri
 
     labels = () if pairs is None else tuple(dict.fromkeys(pairs.surface))
-    widths = {"each surface": len(labels), "each pair": 0 if pairs is None else len(pairs.surface)}
+    n_pairs = 0 if pairs is None else len(pairs.surface)
+    widths = {"each surface": len(labels), "each pair": n_pairs, "each sector": n_sectors}
     groups = [widths.get(each.of) or 1 for each in section.inputs.values()]
     design = unit_design(section.method, section.seed, section.samples, sum(groups), groups)
     scores = np.split(ndtri(design), np.cumsum(groups)[:-1], axis=1)
@@ -251,9 +261,13 @@ def draw(
         shape: tuple[int, ...] = (*own.shape[:-1], len(score))
         if pairs is None:
             score = score[:, 0]
+        elif name == SECTOR_FREQUENCY:
+            shape = score.shape
         else:
-            shape = (len(score), len(pairs.surface))
-            if scattered.of == "each surface":
+            shape = (len(score), n_pairs)
+            if scattered.of == "each sector":
+                score = np.repeat(score, n_pairs // n_sectors, axis=1)
+            elif scattered.of == "each surface":
                 score = score[:, [labels.index(label) for label in pairs.surface]]
             elif scattered.correlation_length is not None:
                 score = score @ _field(name, scattered.correlation_length, pairs).T

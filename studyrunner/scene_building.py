@@ -22,7 +22,7 @@ from studyrunner.mpi.dispatch import CostKeys
 from studyrunner.mpi.ranks import Ranks
 from studyrunner.mpi.schedule import TaskHandler, serve_tasks
 from studyrunner.scene import answers
-from studyrunner.scene.scene import SceneFacts, build_study_scene, describe_scene, model_key
+from studyrunner.scene.scene import SceneFacts, build_study_scene, describe_study_scene, model_key
 from studyrunner.scene.scene_set import SceneSet, find_scenes
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import keys_in_file
@@ -208,4 +208,4 @@ def build_scene_task(task: SceneTask, progress: Progress) -> Iterator[SceneBuilt
         yield SceneBuilt(None, error=error)
         return
     packed = pack(model) if known is None else None
-    yield SceneBuilt(describe_scene(model), variables, packed, warnings=tuple(warnings))
+    yield SceneBuilt(describe_study_scene(task.study, model), variables, packed, warnings=tuple(warnings))

@@ -17,12 +17,13 @@ from studies.finite_element.structure import FeModel, JointDefinition, Reduction
 from studies.finite_element.surfaces import describe_mesh
 from studies.scene import N_MODES, Density, Pascal, Rpm, Scene, SurfaceMesh, lowest
 from studies.scene_error import SceneError
+from studies.sectors import OfRing
 
 _SAME_NODE = 1e-9  # points closer than this, in m, are one node
 AXIS, ORIGIN = np.array([0.0, 0.0, 1.0]), np.zeros(3)
 
 
-class SectorParameters(Scene):
+class SectorParameters(OfRing, Scene):
     """Parameters that every sector has. SI units, except rotation speed and angles.
 
     Keys that end in `_radius` ascend as their defaults do.
@@ -99,7 +100,8 @@ class SectorParameters(Scene):
         Stress stiffening takes the stress of the glued sector: in the blade it follows from equilibrium alone, and how
         the contacts share the load matters only beside them.
         """
-        options = ReductionOptions(self.nodal_diameter, self.stuck_modes, self.loss_factor)
+        ring = self.sectors is not None
+        options = ReductionOptions(self.nodal_diameter, self.stuck_modes, self.loss_factor, all_sectors=ring)
         return build_fe_scene(*self.define_sector(), options, n_harmonics).model
 
     def describe_mesh(self) -> SurfaceMesh:

@@ -2,13 +2,16 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
 
 from solver.compliant_contact import with_evolution
 from solver.model import ReducedModel, with_friction
-from studyrunner.scene.scene_set import ContactChange
+from solver.structure.ring import build_ring
+from studyrunner.scatter import SECTOR_FREQUENCY
+from studyrunner.scene.scene_set import FORCED_SECTOR, ContactChange
 from studyrunner.study.study import Study
 
 Evolving = tuple[tuple[str, tuple[tuple[str, tuple[float, ...]], ...]], ...]
@@ -29,16 +32,29 @@ class TaskJoint:
     contact: ContactChange = ()
     evolution: Evolving = ()
 
+    @property
+    def n_sectors(self) -> int:
+        """Sectors of a ring whose joints it has together; 1 where it is that of one."""
+        return len(dict(self.contact).get(SECTOR_FREQUENCY, (0.0,)))
+
     def model(self, models: Mapping[int, ReducedModel]) -> ReducedModel:
         """The model of the scene with its friction and what is drawn for the pairs. models: by number of the scene."""
-        model = models[self.scene]
-        drawn: dict[str, Any] = {name: np.array(values) for name, values in self.contact}
+        model, changes = models[self.scene], dict(self.contact)
+        if SECTOR_FREQUENCY in changes:
+            model = _ring(model, changes.pop(SECTOR_FREQUENCY), *changes.pop(FORCED_SECTOR, ()))
+        drawn: dict[str, Any] = {name: np.array(values) for name, values in changes.items()}
         energy = drawn.pop("energy", np.zeros(model.contact.n_contact))
         model = replace(model, contact=replace(model.contact, **drawn))
         if self.evolution:
             model = evolving(model, self.evolution)
             model = replace(model, contact=model.contact.after(energy))
         return with_friction(model, self.friction_coefficient)
+
+
+@lru_cache(maxsize=2)
+def _ring(model: ReducedModel, deviations: tuple[float, ...], forced: float | None = None) -> ReducedModel:
+    """The ring of a sector; the last ones are kept, with all that is derived from their structure."""
+    return build_ring(model, deviations, forced_sector=None if forced is None else int(forced))
 
 
 def evolving(model: ReducedModel, evolution: Evolving) -> ReducedModel:

@@ -23,7 +23,8 @@ class Kind:
     - reads: keys that it reads of tables which not every kind reads as a whole. why: another one is to be left out.
     - rules: what it asks of the tables of a study; those of a kind with a table of its own are in its file "rules".
     - asked, always, more: variables that `outputs.variables` may name, that every result holds, and that other keys ask
-      for; in the order of the file. usual, of_samples: those where the study names none, and where samples are drawn.
+      for; in the order of the file. of_rings: of studies of all sectors of a ring. usual, of_samples: those where the
+      study names none, and where samples are drawn.
     - scene: what `outputs.variables` may ask of the scene, names of `coordinates.SCENE`.
     - counted: what the slow time counts; empty without a slow time: `cycle` is then an axis, of the wear before.
     - whole: whether these counts are whole numbers.
@@ -47,6 +48,7 @@ class Kind:
     asked: Mapping[str, Variable]
     always: Mapping[str, Variable]
     more: Mapping[str, Variable] = field(default_factory=dict)
+    of_rings: Mapping[str, Variable] = field(default_factory=dict)
     usual: tuple[str, ...]
     of_samples: tuple[str, ...]
     scene: tuple[str, ...] = ("mesh", "natural_frequency")
@@ -73,7 +75,7 @@ class Kind:
     @property
     def variables(self) -> Mapping[str, Variable]:
         """All that its tasks compute."""
-        return {**self.asked, **self.always, **self.more}
+        return {**self.asked, **self.always, **self.more, **self.of_rings}
 
     def is_in(self, tables: Mapping[str, Any]) -> bool:
         """Whether the tables of a study file have what marks it."""

@@ -23,6 +23,25 @@ def deepest(depth: NDArray[np.float64], error: NDArray[np.float64]) -> dict[str,
     return {"wear_depth_max": depth.max(axis=1, initial=0.0), "wear_depth_max_error": of_deepest}
 
 
+def of_sectors(
+    n_sectors: int, response: NDArray[np.complex128], depth: NDArray[np.float64], area: NDArray[np.float64]
+) -> dict[str, NDArray[np.float64]]:
+    """Variables of a ring from responses (..., n_response), depths (n_counts, n_contact), m, and areas, m2, of the
+    pairs, sector by sector.
+    """
+    first = response.reshape(*response.shape[:-1], n_sectors, -1)[..., 0]
+    worn, amplitude = depth.reshape(len(depth), n_sectors, -1), np.abs(first)
+    with np.errstate(invalid="ignore"):  # where nothing moves
+        magnification = amplitude.max(axis=-1) / amplitude.mean(axis=-1)
+    return {
+        "sector_amplitude": amplitude,
+        "sector_phase": np.angle(first),
+        "sector_worn_volume": (worn * area.reshape(n_sectors, -1)).sum(axis=-1),
+        "sector_wear_depth": worn.max(axis=-1),
+        "amplitude_magnification": magnification,
+    }
+
+
 def describe_target(until: WearTarget | None, reached: float, counted: str, *, whole: bool) -> str:
     """That the target of a history was not reached, or that what comes after it is not computed; else empty.
 

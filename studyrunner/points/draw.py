@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from solver.model import ContactInterface
-from studyrunner.scatter import Scattered, draw
+from studies.sectors import LARGEST_DEVIATION
+from studyrunner.scatter import SECTOR_FREQUENCY, Scattered, draw
 from studyrunner.study.room import with_room_for_wear
 from studyrunner.study.scene_section import SceneSection
 from studyrunner.study.study import Study
@@ -15,11 +16,15 @@ from studyrunner.values import Wrong
 
 
 def draw_inputs(
-    study: Study, pairs: ContactInterface | None = None, own_values: Mapping[str, NDArray[np.float64]] | None = None
+    study: Study,
+    pairs: ContactInterface | None = None,
+    own_values: Mapping[str, NDArray[np.float64]] | None = None,
+    n_sectors: int = 1,
 ) -> dict[str, NDArray[np.float64]]:
     """Values of the inputs that are the same for all pairs, or with pairs of those that belong to them, as `draw`.
 
-    study: without axes that are keys of [scene] or [wear]. own_values: of the pairs, (n_pairs,). Raises UserError.
+    study: without axes that are keys of [scene] or [wear]. own_values: of the pairs, (n_pairs,), or sectors. Raises
+    UserError.
     """
     section = study.scatter
     if section is None:
@@ -29,7 +34,12 @@ def draw_inputs(
         name: _own_value(study, name, each) for name, each in inputs if name not in section.of_pairs
     }
     try:
-        return draw(section, own, pairs)
+        found = draw(section, own, pairs, n_sectors)
+        largest = float(np.abs(found.get(SECTOR_FREQUENCY, 0.0)).max())
+        if largest > LARGEST_DEVIATION:
+            remedy = f"give less width: a sample draws a deviation of {largest:.3g}, at most {LARGEST_DEVIATION} is one"
+            raise Wrong(f"scatter.{SECTOR_FREQUENCY}", None, remedy)
+        return found
     except Wrong as error:
         raise UserError(study.source, error.key or "scatter", error.value, error.remedy) from None
 

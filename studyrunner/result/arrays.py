@@ -9,6 +9,7 @@ from solver.outcome import Outcome
 from studyrunner.coordinates import COORDINATES, OF_SCENE, POINT, SAMPLE
 from studyrunner.kinds.wear.kind import ASKED
 from studyrunner.points.table import Column, Points
+from studyrunner.scatter import SECTOR_FREQUENCY
 from studyrunner.scene import scene_set
 from studyrunner.scene.answers import SmallArray
 from studyrunner.scene.scene import SceneFacts, dimensions_behind
@@ -81,6 +82,11 @@ def coordinates(study: Study, of_scenes: Sequence[SceneFacts], scenes: scene_set
     yield from _of_pairs(of_scenes, scenes)
     if facts.edge is not None:
         yield _of_scene("contact_edge", (), facts.edge)
+    if study.scene.ring is not None:
+        sectors = np.repeat(np.arange(facts.n_ring, dtype=np.int32), facts.contact.n_contact // facts.n_ring)
+        yield _of_scene("contact_sector", (), sectors)
+        deviations = np.array(study.scene.ring.frequency or np.zeros(facts.n_ring))
+        yield _of_scene(SECTOR_FREQUENCY, (), deviations)
 
 
 def _of_pairs(facts: Sequence[SceneFacts], scenes: scene_set.SceneSet) -> Iterator[SmallArray]:
@@ -113,7 +119,7 @@ def _coordinate_entry(study: Study, name: str) -> Variable:
 
 def _worn_coordinate(study: Study, facts: Sequence[SceneFacts], points: Points) -> Iterator[SmallArray]:
     """Wear depths with which the histories begin; none where the study has several scenes or no worn one."""
-    if study.scene.worn is not None and len(facts) == 1:
+    if scene_set.begins_worn(study) and len(facts) == 1:
         axes = [axis.name for axis in study.scene_axes if axis.is_worn]
         names, values = points.along([scene_set.worn_depth(each, facts[0]) for each in points.studies], keep=axes)
         yield _of_scene("worn_depth", names, values)
@@ -132,11 +138,13 @@ def sample_coordinates(study: Study, facts: Sequence[SceneFacts], scenes: scene_
             yield _sample_coordinate(study, name, *points.array(_drawn(study, points, name), keep=(SAMPLE,)))
     of_studies = scene_set.drawn_pairs(study, scenes, facts)
     for name in study.scatter.of_pairs:
-        values = np.full((len(of_studies), max(each.contact.n_contact for each in facts)), np.nan)
+        of_what = "sector" if name == SECTOR_FREQUENCY else "contact"
+        n = max(each.n_ring if of_what == "sector" else each.contact.n_contact for each in facts)
+        values = np.full((len(of_studies), n), np.nan)
         for row, drawn in zip(values, of_studies, strict=True):
             row[: len(drawn[name])] = drawn[name]
         names, values = points.along(list(values), keep=(SAMPLE,))
-        yield _sample_coordinate(study, name, (*names, "contact"), values)
+        yield _sample_coordinate(study, name, (*names, of_what), values)
 
 
 def _drawn(study: Study, points: Points, name: str) -> Column:

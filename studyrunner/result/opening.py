@@ -241,7 +241,7 @@ def _known_variables(dataset: xr.Dataset) -> dict[str, tuple[tuple[str, ...], Va
         if name in dataset.dims:
             known[name] = (name,), None
         elif name.startswith(DRAWN) or (name == "frequency" and along):
-            known[name] = (*along, *(each for each in ("contact",) if each in variable.dims)), _DRAWN_VALUES
+            known[name] = (*along, *(each for each in ("contact", "sector") if each in variable.dims)), _DRAWN_VALUES
             is_along = {SAMPLE, "frequency_ratio", POINT} & set(along)
             _need(is_along, name, f"dimensions {', '.join(map(str, variable.dims))}")
         elif name in with_axes:

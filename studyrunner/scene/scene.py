@@ -5,7 +5,7 @@ import hashlib
 import json
 import math
 from collections.abc import Hashable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -16,10 +16,12 @@ from solver.model import ContactInterface, ReducedModel
 from studies.scene import Progress, silent, stuck_frequencies
 from studies.scene_error import SceneError
 from studies.scenes import AUTOMATIC_HARMONICS_OF_A_WAVE
+from studies.sectors import ring_of
 from studyrunner.kinds.wear.kind import LOOP_COMPONENTS, LOOP_PHASES, LOOPS
 from studyrunner.study.mistakes import raise_wrong, scene_errors
 from studyrunner.study.study import Study
 from studyrunner.system.machine import package_digest
+from studyrunner.user_error import UserError, Verbatim
 from studyrunner.values import Wrong
 
 _LARGEST_HISTORY = 1e9  # bytes: a result is one message between ranks
@@ -36,7 +38,8 @@ class SceneFacts:
     n_displacements: number of relative displacements, the unknowns of one harmonic coefficient. contact: its pairs.
     response_names: n_response texts. digest: SHA-256 of all arrays and names of the reduced model. largest_harmonics:
     None without limit. stuck_frequency: Hz, first natural frequency with the joint stuck; NaN where there is none.
-    edge (n_contact,): see `edge_pairs`.
+    edge (n_contact,): see `edge_pairs`. n_ring: sectors, of a ring of which pairs and responses are; else 1. differ:
+    whether its blades may differ.
     """
 
     n_displacements: int
@@ -46,6 +49,8 @@ class SceneFacts:
     largest_harmonics: int | None = None
     stuck_frequency: float = math.nan
     edge: NDArray[np.int8] | None = None
+    n_ring: int = 1
+    differ: bool = False
 
     @cached_property
     def pairs(self) -> Hashable:
@@ -70,11 +75,30 @@ def build_study_scene(study: Study, progress: Progress = silent, known: ReducedM
                 raise
             remedy = f"check its unit, its default is {default:g}; else see {error.key}, {error.value}: {error.remedy}"
             raise SceneError(key, f"{value:g}", remedy) from error
-    raise_wrong(study.source, _wrong_beside(study, model))
+    raise_wrong(study.source, _wrong_beside(study, _ring_of(study, model)))
     if "natural_frequency" in study.scene_variables:
         with scene_errors(study.source, None):
             stuck_frequencies(model)
     return model
+
+
+def _ring_of(study: Study, model: ReducedModel) -> ReducedModel:
+    """The ring that a study computes, of a sector; the model itself where it computes none. Raises UserError."""
+    ring = study.scene.ring
+    if ring is None:
+        return model
+    with scene_errors(study.source, None):
+        whole = ring_of(model)
+    if model.nodal_diameter and study.scene.forced_sector is not None:
+        remedy = "give a scene of nodal diameter 0, or leave it out: the travelling wave excites all sectors"
+        raise UserError(study.source, "scene.forced_sector", study.scene.forced_sector, remedy)
+    place = str(study.folder / ring.file) if ring.file else study.source
+    for name in ("frequency", "friction", "wear_depth"):
+        if (given := len(getattr(ring, name))) not in (0, model.n_sectors):
+            key = "column sector" if ring.file else f"scene.sectors.{name}"
+            remedy = f"give each of the {model.n_sectors} sectors of the scene, 0 to {model.n_sectors - 1}, once"
+            raise UserError(place, key, Verbatim(f"{given} sectors"), remedy)
+    return whole
 
 
 def farthest_from_default(study: Study) -> tuple[str, float, float]:
@@ -111,10 +135,11 @@ def _wrong_beside(study: Study, model: ReducedModel) -> Iterator[Wrong]:
     """What of a study does not fit to the pairs of its scene."""
     contact, friction, loops = model.contact, study.friction_coefficient, study.outputs.loops
     given = contact.friction_coefficient is not None
-    own, file = "friction_coefficient" in study.evolving, "contact/friction_coefficient in the scene file"
+    ring, file = study.scene.ring, "contact/friction_coefficient in the scene file"
+    own = "friction_coefficient" in study.evolving or bool(ring and ring.friction)
     if study.scene.source.path is not None and own and given:
         remedy = f"leave it out: {file} gives each pair its own"
-        yield Wrong("wear.evolution.friction_coefficient", None, remedy)
+        yield Wrong("scene.sectors" if ring and ring.friction else "wear.evolution.friction_coefficient", None, remedy)
     elif study.scene.source.path is not None and given == (friction is not None) and not own:
         remedy = f"leave it out: {file} gives each pair its own" if given else f"missing: give it, or {file}"
         yield Wrong("scene.friction_coefficient", friction, remedy)
@@ -142,6 +167,8 @@ def dimensions_behind(study: Study, facts: SceneFacts) -> dict[str, Sequence[obj
     if kind.counted:
         found[kind.counted] = np.array(study.output_counts, dtype=int if kind.whole else float)
     found |= {**kind.dimensions(study), "contact": range(facts.contact.n_contact), "response": facts.response_names}
+    if study.scene.ring is not None:
+        found["sector"] = range(facts.n_ring)
     if study.outputs.loops:
         found |= {"phase": 2.0 * np.pi * np.arange(LOOP_PHASES) / LOOP_PHASES, "component": LOOP_COMPONENTS}
     return found
@@ -160,6 +187,23 @@ def record_fields(study: Study, facts: SceneFacts) -> list[tuple[str, str, tuple
 def values_of_point(study: Study, facts: SceneFacts) -> int:
     """Number of values in a result."""
     return sum(math.prod(shape) for _, _, shape in record_fields(study, facts))
+
+
+def describe_study_scene(study: Study, model: ReducedModel) -> SceneFacts:
+    """Facts of the scene of a study; of a ring those of all its sectors. model: of a ring that of one sector."""
+    facts = describe_scene(model)
+    if study.scene.ring is None:
+        return facts
+    whole, n = _ring_of(study, model), model.n_sectors
+    return replace(
+        facts,
+        n_displacements=n * facts.n_displacements,
+        contact=whole.contact,
+        response_names=whole.response_names,
+        edge=None if facts.edge is None else np.tile(facts.edge, n),
+        n_ring=n,
+        differ=all(each.blade is not None for each in model.linear.values()),
+    )
 
 
 def describe_scene(model: ReducedModel) -> SceneFacts:

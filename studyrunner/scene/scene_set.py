@@ -14,10 +14,11 @@ from numpy.typing import NDArray
 from studies.scene import Progress
 from studyrunner.points.draw import draw_inputs
 from studyrunner.points.table import Column, Points, points_of
-from studyrunner.scene.scene import SceneFacts, build_study_scene, describe_scene, harmonics_to_build
+from studyrunner.scatter import SECTOR_FREQUENCY
+from studyrunner.scene.scene import SceneFacts, build_study_scene, describe_study_scene, harmonics_to_build
 from studyrunner.study.study import Study
 from studyrunner.study.study_file import keys_in_file
-from studyrunner.user_error import UserError
+from studyrunner.user_error import UserError, Verbatim
 from studyrunner.values import Wrong
 
 _MOST_PLANNED = 8
@@ -90,7 +91,7 @@ def plan_scenes(study: Study, say: Progress) -> tuple[SceneSet, tuple[SceneFacts
         if sizes not in built and len(built) < _MOST_PLANNED:
             say(f"building scene {number + 1} of {len(scenes.studies)}")
             with keys_in_file(study):
-                built[sizes] = describe_scene(build_study_scene(each, say))
+                built[sizes] = describe_study_scene(each, build_study_scene(each, say))
         facts.append(built.get(sizes) or next(reversed(built.values())))
     left = (time.monotonic() - began) / len(built) * (len(facts) - len(built))
     return scenes, tuple(facts), left
@@ -114,7 +115,12 @@ def merge_facts(facts: Sequence[SceneFacts]) -> SceneFacts:
 # --- contact pairs that are not those of the scene: drawn values, wear before the start ---
 
 ContactChange = tuple[tuple[str, tuple[float, ...]], ...]
-"""Names of arrays of the contact interface with their values for all pairs, in place of those of the scene."""
+"""Names of arrays of the contact interface with their values for all pairs, in place of those of the scene.
+
+Also `energy`, with which the pairs begin; of a ring `SECTOR_FREQUENCY` and, where one is, the only `FORCED_SECTOR`.
+"""
+
+FORCED_SECTOR = "forced_sector"
 
 _Values = dict[str, NDArray[np.float64]]
 
@@ -137,15 +143,40 @@ def contact_changes(
         of_pairs = drawn_pairs(study, scenes, facts, place)
         for whole, numbers, drawn in zip(scenes.points.studies, scenes.of_blocks, of_pairs, strict=True):
             own, scene = whole.parts[place], facts[numbers[place]]
-            if own.scene.worn is not None:
+            drawn = _of_ring(own, scene) | drawn
+            _check_ring(own, scene, drawn)
+            if begins_worn(own):
                 # wear opens a pair as a gap does, Eq. (7)
                 drawn = {**drawn, "gap": drawn.get("gap", scene.contact.gap) + worn_depth(own, scene)}
-                if own.evolving:
+                if own.scene.worn is not None and own.evolving:
                     energy = own.scene.worn.of_pairs(own.scene.worn.energy[0], len(drawn["gap"]))
                     drawn = {**drawn, "energy": np.array(energy)}
             changes.append(tuple((name, tuple(each.tolist())) for name, each in drawn.items()))
         of_blocks.append(changes)
     return tuple(zip(*of_blocks, strict=True))
+
+
+def _of_ring(study: Study, facts: SceneFacts) -> _Values:
+    """What the sectors of a ring have of their own; nothing of another scene."""
+    ring, n = study.scene.ring, facts.n_ring
+    if ring is None:
+        return {}
+    found = {SECTOR_FREQUENCY: np.array(ring.frequency or np.zeros(n))}
+    if study.scene.forced_sector is not None:
+        found[FORCED_SECTOR] = np.array([float(study.scene.forced_sector)])
+    if ring.friction:
+        found["friction_coefficient"] = np.repeat(ring.friction, facts.contact.n_contact // n)
+    return found
+
+
+def _check_ring(study: Study, facts: SceneFacts, values: _Values) -> None:
+    """Raises UserError where a sector is excited that there is none, or the scene does not know the blades."""
+    forced = study.scene.forced_sector
+    if forced is not None and forced >= facts.n_ring:
+        raise UserError(study.source, "scene.forced_sector", forced, f"give 0 to {facts.n_ring - 1}")
+    if SECTOR_FREQUENCY in values and values[SECTOR_FREQUENCY].any() and not facts.differ:
+        found = Verbatim("the scene file does not say what differs where a frequency of a blade does")
+        raise UserError(study.source, "scene.sectors", found, "give the dataset blade in each group nd/<k>")
 
 
 def drawn_pairs(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts], block: int = 0) -> list[_Values]:
@@ -168,15 +199,24 @@ def drawn_pairs(study: Study, scenes: SceneSet, facts: Sequence[SceneFacts], blo
                 of_all = np.nan if variant.friction_coefficient is None else variant.friction_coefficient
                 friction = np.full(contact.n_contact, of_all) if friction is None else friction
                 values = {"gap": contact.gap, "area": contact.area, "friction_coefficient": friction}
-                drawn[key] = draw_inputs(variant, contact, values)
+                drawn[key] = draw_inputs(variant, contact, values | _of_ring(variant, own), own.n_ring)
             found.append({name: each[sample] for name, each in drawn[key].items()})
     return found
 
 
+def begins_worn(study: Study) -> bool:
+    """Whether the joint of a study is worn before the history begins."""
+    return study.scene.worn is not None or bool(study.scene.ring and study.scene.ring.wear_depth)
+
+
 def worn_depth(study: Study, facts: SceneFacts) -> NDArray[np.float64]:
-    """Wear depths (n_contact,), m, with which a study of a worn scene begins. Raises UserError where pairs differ."""
-    assert study.scene.worn is not None
+    """Wear depths (n_contact,), m, with which a study of a worn scene begins: that of the key and that of each sector.
+
+    Raises UserError where pairs differ.
+    """
+    n, ring, worn = facts.contact.n_contact, study.scene.ring, study.scene.worn
+    of_sectors = np.repeat(ring.wear_depth, n // facts.n_ring) if ring and ring.wear_depth else np.zeros(n)
     try:
-        return np.array(study.scene.worn.depths(facts.contact.n_contact))
+        return of_sectors if worn is None else of_sectors + np.array(worn.depths(n))
     except Wrong as error:
         raise UserError(study.source, f"scene.worn.{error.key}", error.value, error.remedy) from None

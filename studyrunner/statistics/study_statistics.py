@@ -256,9 +256,9 @@ def _of_inputs(
         return found | _bands("total_index", f"{words}, with the others", "1", total, dims)
     words = f"rank correlation of the {of} with the input"
     found = _bands("rank_correlation", words, "1", samples.rank_correlations(table, values, confidence), dims)
-    # the mean over the pairs says nothing of what their own draws decide
+    # the mean over pairs or sectors says nothing of what their own draws decide
     for _, ends, _ in found.values():
-        ends[..., ["contact" in each.dims for each in drawn], :] = np.nan
+        ends[..., [not {"contact", "sector"}.isdisjoint(each.dims) for each in drawn], :] = np.nan
     return found
 
 

@@ -7,7 +7,7 @@ from typing import Any, cast, get_args
 from solver.settings import FIRST_HARMONICS
 from studyrunner.kinds.table import KINDS
 from studyrunner.measured import QUANTITIES
-from studyrunner.scatter import LIVES, OF_PAIRS
+from studyrunner.scatter import LIVES, OF_PAIRS, SECTOR_FREQUENCY
 from studyrunner.study.mistakes import nearest_name
 from studyrunner.study.sections import ALLOWABLE, AUTO, DEFAULT
 from studyrunner.study.study import Study
@@ -21,7 +21,7 @@ def broken_rules(study: Study, first: bool) -> Iterator[Wrong]:
     it is the first of the variants, which have the same axes.
     """
     of_all = (_keys, study.kind.broken_rules, _frequency, _amplitude, _measured) if first else ()
-    for rule in (*of_all, _outputs, _solver_and_end, _scatter, _evolution):
+    for rule in (*of_all, _outputs, _solver_and_end, _scatter, _evolution, _ring):
         yield from rule(study)
 
 
@@ -149,6 +149,30 @@ def _evolution(study: Study) -> Iterator[Wrong]:
             yield Wrong(f"mission.{block.name}.{name}", block.parameters[name], remedy)
 
 
+def _ring(study: Study) -> Iterator[Wrong]:
+    """A ring is of studies that know one, and its friction is given once."""
+    ring, scatter = study.scene.ring, study.scatter.inputs if study.scatter else {}
+    of_sectors = [name for name, each in scatter.items() if each.of == "each sector"]
+    if ring is None:
+        for name in of_sectors:
+            yield Wrong(f"scatter.{name}", None, 'give scene.sectors = "all" beside it: one sector stands for all')
+        if study.scene.forced_sector is not None:
+            yield Wrong("scene.forced_sector", study.scene.forced_sector, 'give scene.sectors = "all" beside it')
+        return
+    if not study.kind.of_rings:
+        yield Wrong("scene.sectors", None, f"leave it out: {study.kind.words} are those of one sector")
+    given, once = dict(study.scene.parameters)["friction_coefficient"], "leave it out: scene.sectors gives friction"
+    if ring.friction and "friction_coefficient" in study.scene.parameters.model_fields_set and given is not None:
+        yield Wrong("scene.friction_coefficient", given, once)
+    if ring.friction and "friction_coefficient" in study.evolving:
+        yield Wrong("wear.evolution.friction_coefficient", None, once)
+    if ring.friction and "friction_coefficient" in {*scatter} - {*(study.scatter.of_pairs if study.scatter else ())}:
+        yield Wrong("scatter.friction_coefficient", None, f'{once}, or give of = "each sector"')
+    if any(ring.wear_depth) and study.evolving:
+        remedy = "leave it out: with [wear.evolution] give scene.worn, with the energy that was dissipated"
+        yield Wrong("scene.sectors.wear_depth", None, remedy)
+
+
 def _limits(study: Study) -> Iterator[Wrong]:
     """Limits are of the wear after all cycles, or with a target of the life until then."""
     limits = study.scatter.given_limits if study.scatter else {}
@@ -170,7 +194,7 @@ def _scatter(study: Study) -> Iterator[Wrong]:
     fields = type(study.scene.parameters).model_fields
     # numbers with fractions
     floats = [name for name, field in fields.items() if float in (field.annotation, *get_args(field.annotation))]
-    known = [*study.kind.numbers, *OF_PAIRS, *floats, *study.wear.numbers]
+    known = [*study.kind.numbers, *OF_PAIRS, SECTOR_FREQUENCY, *floats, *study.wear.numbers]
     yield from _limits(study)
     for name, scattered in study.scatter.inputs.items() if study.scatter else ():
         several = name in study.kind.numbers and len(getattr(study.axes, name) or ()) > 1

@@ -60,7 +60,8 @@ def take_axes(
     Raises UserError.
     """
     tables_of = {"solver": SOLVER_AXES, "wear": WearSection.AXES, "scene": scene.model_fields}
-    places = {name: table for table, names in tables_of.items() for name in names}
+    # how sectors differ is a table, of one study
+    places = {name: table for table, names in tables_of.items() for name in names if name != "sectors"}
     keys: dict[str, tuple[str, ...]] = {}
     given: Tables = {}
     wrong: list[Wrong] = []

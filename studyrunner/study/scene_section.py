@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, InstanceOf, SerializeAsAny
 
 from studies.scene_source import SceneSource, source_of
+from studies.sectors import OfRing, Sectors
 from studyrunner.study.mistakes import check_tables, raise_wrong, scene_errors
 from studyrunner.study.text import Archived, check_result_file, result_errors
 from studyrunner.system.progress import count as counted
@@ -99,6 +100,16 @@ class SceneSection(Section):
     parameters: SerializeAsAny[BaseModel]
     worn: Worn | None = Field(None, description="wear before the history begins")
     source: InstanceOf[SceneSource] = Field(exclude=True)
+
+    @property
+    def ring(self) -> Sectors | None:
+        """How the sectors of a ring differ; None where a study computes no ring."""
+        return self.parameters.ring if isinstance(self.parameters, OfRing) else None
+
+    @property
+    def forced_sector(self) -> int | None:
+        """The only sector that is excited."""
+        return self.parameters.forced_sector if isinstance(self.parameters, OfRing) else None
 
     @property
     def of_model(self) -> dict[str, Any]:

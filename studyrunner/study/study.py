@@ -84,7 +84,10 @@ class Study(Section):
     def recorded(self) -> Mapping[str, Variable]:
         """Variables of its points, beside those that every result holds."""
         asked = {name: entry for name, entry in self.kind.asked.items() if name in self.outputs.variables}
-        more = (LOOPS, self.outputs.loops), (COUNTS, self.to_the_end), (ALLOWED, self.allowable)
+        more = (
+            *((LOOPS, self.outputs.loops), (COUNTS, self.to_the_end), (ALLOWED, self.allowable)),
+            (self.kind.of_rings, self.scene.ring),
+        )
         return asked | {name: entry for table, is_there in more if is_there for name, entry in table.items()}
 
     @property
@@ -96,8 +99,9 @@ class Study(Section):
     def files(self) -> tuple[Path, ...]:
         """Files that a run of the study reads."""
         worn = self.scene.worn.result if self.scene.worn else ""
+        sectors = self.scene.ring.file if self.scene.ring else ""
         own, measured = self.folder / Path(self.source).name, self.measured.all if self.measured else ()
-        names = [worn, *(each.file for _, each in measured)]
+        names = [worn, sectors, *(each.file for _, each in measured)]
         return (own, *self.scene.source.files, *(self.folder / name for name in names if name))
 
     @property

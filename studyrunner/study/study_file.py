@@ -12,11 +12,13 @@ from pydantic import BaseModel
 
 from solver.settings import FOLLOWED, Followed, FollowedFrequency
 from studies.hdf5 import is_hdf5
+from studies.sectors import OfRing
 from studyrunner.coordinates import COORDINATES, SCENE
 from studyrunner.kinds.table import KINDS
 from studyrunner.kinds.wear.kind import FOLLOWED_FREQUENCY, OF_EVOLUTION
 from studyrunner.measured import QUANTITIES, read_measured
 from studyrunner.scatter import flat_table
+from studyrunner.sectors import read_sectors
 from studyrunner.study import scene_axes, sections
 from studyrunner.study.design import Design, read_archived_design, read_design
 from studyrunner.study.mistakes import check_tables, keys_as_given, nearest_name, raise_wrong
@@ -142,6 +144,8 @@ def _check_study(table: Mapping[str, object], origin: Origin, design: Design | N
         remedy = f"leave it out, or {others[0].marker}: a study is of {kind.words} or of {others[0].words}"
         raise UserError(source, kind.marker, None, remedy)
     worn = None if worn is None else read_worn(worn, source, origin.path.parent)
+    if issubclass(parameters, OfRing) and "sectors" in tables["scene"]:
+        tables["scene"]["sectors"] = read_sectors(tables["scene"]["sectors"], source, origin.path.parent)
     if "measured" in tables:
         tables["measured"] = read_measured(tables["measured"], source, origin.path.parent)
     solver_axes = tuple(key for key in sections.SOLVER_AXES if key in tables["axes"])
@@ -225,6 +229,7 @@ def format_study(study: Study) -> str:
     own, others = dict(study.scene.parameters), [dict(each.scene.parameters) for each in study.variants]
     chosen = {key for key in own if key not in names and any(other[key] != own[key] for other in others)}
     chosen |= {*study.evolving}  # whose first numbers stand there
+    chosen |= {"friction_coefficient"} if study.scene.ring and study.scene.ring.friction else set()
     kept = {key: value for key, value in tables["scene"]["parameters"].items() if key not in chosen}
     tables["scene"] = {"model": study.scene.model, **kept, "worn": _worn_states(study)}
     used = {*study.own_axes, *study.kind.last_axes, *study.kind.other_axes}

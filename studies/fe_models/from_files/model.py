@@ -83,7 +83,8 @@ def reduce_model(
 ) -> FeScene:
     """Reduced model of a loaded one, which may be prepared already. Raises SceneError."""
     own = loaded.parameters
-    options = ReductionOptions(own.nodal_diameter, own.stuck_modes, own.loss_factor)
+    ring = own.sectors is not None
+    options = ReductionOptions(own.nodal_diameter, own.stuck_modes, own.loss_factor, all_sectors=ring)
     return build_fe_scene(loaded.model, loaded.joint, options, n_harmonics, progress, prepared)
 
 

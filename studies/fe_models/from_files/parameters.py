@@ -6,6 +6,7 @@ from typing import Annotated, Literal
 from pydantic import AfterValidator, BeforeValidator, Field
 
 from studies.scene import ContactStiffness, Density, Metre, Newton, NewtonPerMetre, Pascal, Remark, Rpm, Table, Unit
+from studies.sectors import OfRing
 
 
 def _as_tuple(value: object) -> object:
@@ -54,7 +55,7 @@ class MaterialTable(Table):
     density: Density = Field(gt=0)
 
 
-class Parameters(Table):
+class Parameters(OfRing):
     """[scene] of a finite-element model. What is not given comes from the deck."""
 
     friction_coefficient: Annotated[float | dict[str, float] | None, Remark("default: the deck's")] = Field(

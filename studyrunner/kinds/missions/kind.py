@@ -6,7 +6,7 @@ Slow time is counted in missions, and some values are those of single blocks.
 from dataclasses import replace
 
 from studyrunner.kinds.kind import Kind
-from studyrunner.kinds.wear.kind import ASKED, OF_A_HISTORY, OF_SAMPLES_ALONE
+from studyrunner.kinds.wear.kind import ASKED, OF_A_HISTORY, OF_RINGS, OF_SAMPLES_ALONE
 from studyrunner.variables import Variable
 
 _OF_ONE = "Of the mission that ends at the number; at 0 of the first mission."
@@ -15,7 +15,7 @@ _BLOCK, _BLOCKS = ("block",), ("mission", "block")
 
 def _by_mission(name: str) -> Variable:
     """A variable of wear histories with missions in place of cycles."""
-    entry = (ASKED | OF_A_HISTORY)[name]
+    entry = (ASKED | OF_A_HISTORY | OF_RINGS)[name]
     long_name, comment = (
         text.replace("cycle count", "number of missions").replace("cycles", "missions")
         for text in (entry.long_name, entry.comment)
@@ -90,6 +90,12 @@ MISSIONS = Kind(
     why="leave it out: slow_time.missions counts in place of cycles, and missions choose their own steps",
     asked=OF_MISSIONS,
     always=OF_A_MISSION,
+    of_rings={name: _by_mission(name) for name in ("sector_worn_volume", "sector_wear_depth")}
+    | {
+        name: replace(entry, dimensions=(*_BLOCKS, *entry.dimensions[1:]), long_name=f"{entry.long_name} at its end")
+        for name, entry in OF_RINGS.items()
+        if "wear" not in name and "worn" not in name
+    },
     usual=tuple(name for name in OF_MISSIONS if name not in OF_SAMPLES_ALONE),
     of_samples=tuple(name for name in OF_MISSIONS if name not in ("wear_depth", "wear_depth_error")),
     counted="mission",

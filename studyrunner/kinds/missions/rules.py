@@ -14,7 +14,7 @@ from studyrunner.study.study import Study
 from studyrunner.user_error import UserError
 from studyrunner.values import Positive, Section, Wrong
 
-_NO_KEYS_OF_BLOCKS = ("model", "worn", "mesh")
+_NO_KEYS_OF_BLOCKS = ("model", "worn", "mesh", "sectors")
 
 
 def _check_block_name(value: str) -> str:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
+from numpy.typing import NDArray
 
 from solver.contact.wear_law import WearLaw
 from solver.missions.mission import Begin, Block, MissionRequest
@@ -17,7 +18,7 @@ from studyrunner.kinds import task as tasks
 from studyrunner.kinds.estimate import iterations_of_sweep, seconds_of
 from studyrunner.kinds.joint import TaskJoint
 from studyrunner.kinds.missions.kind import OF_A_MISSION
-from studyrunner.kinds.results import deepest, describe_target, first_harmonic, named
+from studyrunner.kinds.results import deepest, describe_target, first_harmonic, named, of_sectors
 from studyrunner.points.table import Points
 from studyrunner.study.sections import AUTO
 from studyrunner.study.study import Study
@@ -106,7 +107,9 @@ class Mission(tasks.Task):
         read = tuple(sorted({0, 1} | wanted | {max(number - 1, 0) for number in wanted}))
         first = cast("Direction", self.first)
         asked = MissionRequest(blocks, self.wear_coefficient, read, self.settings, self.law, self.until, first)
-        yield tasks.PointResult(_values(self, integrate_missions(asked, note, self.resume)))
+        yield tasks.PointResult(
+            _values(self, integrate_missions(asked, note, self.resume), blocks[0].model.contact.area)
+        )
 
     def describe(self, place: int) -> str:  # noqa: ARG002
         """Its number."""
@@ -129,7 +132,8 @@ def build_tasks(study: Study, points: Points, n_displacements: Sequence[int]) ->
             number=0,
             scenes=scenes,
             settings=settings,
-            cost=seconds_of(n_unknowns, _iterations(ways, study.output_counts[-1])) * _finer(settings),
+            cost=seconds_of(n_unknowns, _iterations(ways, study.output_counts[-1]), joints[0].n_sectors)
+            * _finer(settings),
             n_unknowns=n_unknowns,
             blocks=blocks,
             law=law,
@@ -183,8 +187,8 @@ def _blocks(
         yield PlannedBlock(given.name, joint, frequency, amplitude, cycles, cast("Begin", begin))
 
 
-def _values(task: Mission, history: "MissionHistory") -> dict[str, Any]:
-    """Variables of the result, at the numbers of missions that the task asks for."""
+def _values(task: Mission, history: "MissionHistory", area: NDArray[np.float64]) -> dict[str, Any]:
+    """Variables of the result, at the numbers of missions that the task asks for. area: of the pairs, m2."""
     from solver.results.history import last_error
 
     counts = np.array(task.missions)
@@ -200,7 +204,11 @@ def _values(task: Mission, history: "MissionHistory") -> dict[str, Any]:
     whole, target = history.last_mission >= task.missions[-1], ""
     if history.outcome.complete:
         target = describe_target(task.until, history.missions_to_target, "mission", whole=whole)
+    n_sectors, of_ring = task.blocks[0].joint.n_sectors, {}
+    if n_sectors > 1:
+        of_ring = of_sectors(n_sectors, history.response_end[rows], history.wear_depth[rows], area)
     own: Mapping[str, object] = {
+        **of_ring,
         **{name: getattr(history, name)[rows] for name in (*of_depth, *of_energy)},
         **{name: getattr(history, name)[rows] for name in ("response_error", "response_peak_begin")},
         **deepest(history.wear_depth[rows], history.wear_depth_error[rows]),

@@ -81,7 +81,7 @@ class AllowableAmplitude(Task):
             keep(pack(tried))
 
         found = find_allowable(history_at, until, self.settings.rtol, known, note)
-        result = build_result(history, integrated, found.history)
+        result = build_result(history, integrated, found.history, area=model.contact.area)
         own: dict[str, Any] = {"allowable_amplitude": found.amplitude, "allowable_amplitude_error": found.error}
         own |= {"outcome": int(found.outcome), "message": found.message}
         yield PointResult({**result.values, **own})

@@ -249,11 +249,12 @@ class History(_FromRest):
             done = share_done(first.scheme, first.step, end, n_complete, share)
             keep(Part(done, f"{words} of {end:g}") if done > 0.0 else words)
 
+        area = model.contact.area
         histories = integrate_together(model, self.settings, start, asked, keep, self.resume, note)
         slips = slip_amplitude(start, model)
         for (each, places), history in zip(needed.items(), histories, strict=True):
             for place in places:
-                yield replace(build_result(self, each, history, self.results[place][1], slips), place=place)
+                yield replace(build_result(self, each, history, self.results[place][1], slips, area), place=place)
 
     def asked(self, integrated: Integrated, until: WearTarget | None) -> "WearRequest":
         """What the solver is asked for. until: wear at which the history ends."""

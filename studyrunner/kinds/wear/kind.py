@@ -119,6 +119,23 @@ ALLOWED = {
 }
 """Those of a study with axes.excitation_amplitude = "allowable"."""
 
+_SECTORS = ("cycle", "sector")
+OF_RINGS = {
+    "sector_amplitude": Variable(_SECTORS, "m", "amplitude of the first response of the sector", _MAGNITUDE),
+    "sector_phase": Variable(
+        _SECTORS,
+        "rad",
+        "phase of the first response of the sector",
+        f"{_ANGLE} At the sector's own time: at one time that of sector s is 2 pi s nodal_diameter / n_sectors more.",
+    ),
+    "sector_worn_volume": Variable(_SECTORS, "m3", "worn volume of the sector", "Sums up to worn_volume."),
+    "sector_wear_depth": Variable(_SECTORS, "m", "largest wear depth of any pair of the sector"),
+    "amplitude_magnification": Variable(
+        _CYCLE, "1", "largest sector_amplitude over the mean of all sectors", "1 where all sectors vibrate alike."
+    ),
+}
+"""Those of a ring of sectors, `scene.sectors`."""
+
 OWN_STEPS = ("adaptive", "final")
 """Schemes that choose their steps, without `step`: for another wear coefficient the same ones at other counts."""
 
@@ -191,6 +208,7 @@ WEAR = Kind(
     asked=ASKED,
     always=OF_A_HISTORY,
     more=LOOPS | COUNTS | ALLOWED,
+    of_rings=OF_RINGS,
     usual=USUAL,
     of_samples=OF_SAMPLES,
     scene=("mesh", "natural_frequency", "exact"),

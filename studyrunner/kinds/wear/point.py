@@ -1,14 +1,14 @@
 """The result of a point, read from the history that was integrated for it and for points that share it."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from solver.outcome import Outcome
-from studyrunner.kinds.results import deepest, describe_target, first_harmonic, named
+from studyrunner.kinds.results import deepest, describe_target, first_harmonic, named, of_sectors
 from studyrunner.kinds.task import PointResult
 from studyrunner.kinds.wear.kind import OF_A_HISTORY
 from studyrunner.units import describe_reach
@@ -22,12 +22,17 @@ _NO_SLIP = 1e-12  # m, less than the size of an atom
 
 
 def build_result(
-    task: "History", integrated: "Integrated", history: "WearHistory", place: int = 0, slips: float = math.nan
+    task: "History",
+    integrated: "Integrated",
+    history: "WearHistory",
+    place: int = 0,
+    slips: float = math.nan,
+    area: NDArray[np.float64] | None = None,
 ) -> PointResult:
     """One history of a task at the output counts, with the variables that the task asks for.
 
     integrated: the history that was integrated. place: number among those that are read from it. slips: amplitude of
-    the excitation at which the joint begins to slip, N.
+    the excitation at which the joint begins to slip, N. area: of all pairs of a ring, m2.
 
     What is per cycle is per cycle of that history. What came after its last count has no part in it: jumps, errors, the
     end of the integrated history. Effort is that of the integrated history.
@@ -73,7 +78,12 @@ def build_result(
         "largest_wear_depth": float(history.wear_depth[known].max(initial=0.0)) if known.size else math.nan,
         "message": message or (describe_target(task.until, target, "cycle", whole=whole) if known.size else ""),
     }
-    values = _at_counts(history, task.variables, slower, rows, reached) | named(tuple(OF_A_HISTORY), own, history)
+    of_ring = {}
+    if area is not None and task.joint.n_sectors > 1:
+        of_ring = of_sectors(task.joint.n_sectors, history.response, history.wear_depth, area)
+    values = _at_counts(history, of_ring, task.variables, slower, rows, reached) | named(
+        tuple(OF_A_HISTORY), own, history
+    )
     if integrated.unworn and "dissipated_energy" in values:
         # its state at cycle 0 is that of all cycles
         in_cycle = history.friction_power[0] / history.excitation_frequency[0]
@@ -83,7 +93,12 @@ def build_result(
 
 
 def _at_counts(
-    history: "WearHistory", names: Sequence[str], slower: float, rows: NDArray[np.intp], reached: NDArray[np.bool_]
+    history: "WearHistory",
+    of_ring: Mapping[str, NDArray[np.float64]],
+    names: Sequence[str],
+    slower: float,
+    rows: NDArray[np.intp],
+    reached: NDArray[np.bool_],
 ) -> dict[str, NDArray[np.generic]]:
     """Variables of the result at rows of the history; NaN, or 0 in whole numbers, where not reached.
 
@@ -92,6 +107,7 @@ def _at_counts(
     with np.errstate(divide="ignore", invalid="ignore"):  # of an unworn joint: `build_result`
         energies = {name: getattr(history, name) / slower for name in ("dissipated_energy", "dissipated_energy_error")}
     own = {
+        **of_ring,
         **first_harmonic(history.response),
         **deepest(history.wear_depth, history.wear_depth_error),
         **energies,

@@ -86,7 +86,11 @@ def find_starts(study: Study, points: Points, n_displacements: Sequence[int]) ->
     ends, of_case = np.append(begins[1:], CODE(len(first))), case[first[begins]]
     whole = cases.each(lambda direction: CODE(iterations_of_sweep(direction, 1)), 2)[of_case]
     whole += A_STATE * (ends - begins - 1)
-    an_iteration = cases.each(lambda *given: seconds_of(unknowns_of(*given), 1.0), 0, 3)[of_case]
+
+    def time_of(joints: Sequence[TaskJoint], settings: SolverSettings) -> float:
+        return seconds_of(unknowns_of(joints, settings), 1.0, joints[0].n_sectors)
+
+    an_iteration = cases.each(time_of, 0, 3)[of_case]
     costs = whole * an_iteration
 
     def make(number: int) -> Sweep:

@@ -77,7 +77,7 @@ def _make_histories(starts: Starts, sharing: _Sharing, outputs: Mapping[str, Any
         sweep = sweep_of(group.sweep)
         for together in sharing(group.values)[0]:
             own = {
-                "cost": seconds_of(sweep.n_unknowns, together.iterations),
+                "cost": seconds_of(sweep.n_unknowns, together.iterations, sweep.joint.n_sectors),
                 "indices": tuple(tuple(group.numbers[list(same)].tolist()) for same in together.points),
                 "integrated": together.integrated,
             }
@@ -111,7 +111,7 @@ def _searches(study: Study, starts: Starts, outputs: Mapping[str, Any]) -> Itera
             largest = depth if value.scheme == "explicit" else None
             integrated = Integrated(value.scheme, value.step, largest, (value.wear_coefficient,), unworn=False)
             iterations = iterations_of([(value.scheme, value.step)], study.output_counts[-1], n_energies(study))
-            cost = sweep.cost * sweep.first_share + seconds_of(sweep.n_unknowns, iterations)
+            cost = sweep.cost * sweep.first_share + seconds_of(sweep.n_unknowns, iterations, sweep.joint.n_sectors)
             cost *= HISTORIES_OF_SEARCH * COST_OF_A_HISTORY
             own = {"cost": cost, "indices": (tuple(same),), "integrated": (integrated,)}
             yield AllowableAmplitude.of(_history(sweep, group, number=next(number), **own, **outputs))
