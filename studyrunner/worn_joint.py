@@ -15,6 +15,8 @@ from studyrunner.api import run_study
 from studyrunner.points.table import points_of
 from studyrunner.result.pairs import depths, has_depths, pairs_of_scene
 from studyrunner.result.view import NO_VOLUME, Result, open_for_report
+from studyrunner.scatter import SECTOR_FREQUENCY
+from studyrunner.statistics.samples import DRAWN
 from studyrunner.study.scene_section import WORN_AXIS, worn_before
 from studyrunner.study.sections import SOLVER_AXES
 from studyrunner.study.study_file import read_study
@@ -104,9 +106,10 @@ def _overrides(result: Result) -> dict[str, Any]:
     # a file of an earlier version lacks axes of later ones: the study has their defaults, one value each
     if any(result.dataset.sizes.get(name, 1) != sizes.get(name, 1) for name in {*result.axes, *sizes}):
         raise UserError(str(result.path), "the attribute study", None, "give a result file of run-study that is whole")
-    if study.scatter is not None and study.scatter.of_pairs:
+    of_pairs = [name for name in study.scatter.of_pairs if name != SECTOR_FREQUENCY] if study.scatter else []
+    if of_pairs:
         remedy = "give a result whose samples draw no value for each pair"
-        raise UserError(str(result.path), f"scatter.{study.scatter.of_pairs[0]}", None, remedy)
+        raise UserError(str(result.path), f"scatter.{of_pairs[0]}", None, remedy)
     points, shown = points_of(study), dict.fromkeys(sizes, 0) | result.shown
     part = points.studies[points.at(points.columns["study"], shown)]
     keys: dict[str, Any] = {} if study.design is None else {"points": None}
@@ -114,6 +117,11 @@ def _overrides(result: Result) -> dict[str, Any]:
     # all of them: room for wear is made for the whole history
     parameters = part.scene.parameters.model_dump(mode="json").items()
     keys |= {f"scene.{key}": value for key, value in parameters if key not in study.evolving}
+    if part.scene.ring is not None:
+        drawn = f"{DRAWN}{SECTOR_FREQUENCY}"
+        own = {"frequency": result.at(drawn, shown).values.tolist()} if result.has(drawn) else {}
+        keys["scene.sectors"] = part.scene.ring.model_dump(mode="json") | own
+        keys |= {"scene.friction_coefficient": None} if part.scene.ring.friction else {}
     for name in (*study.kind.axes, *SOLVER_AXES):
         keys[f"axes.{name}"] = points.at(points.axis(name), shown)
     if study.allowable:

@@ -7,7 +7,7 @@ from typing import Any
 from studyrunner.kinds.table import KINDS
 from studyrunner.report import drawing as plot
 from studyrunner.report.drawing import Drawing, Drawn, Item, Missing, Table, as_sentences
-from studyrunner.report.figures import measured, pairs, points, root, samples, wear
+from studyrunner.report.figures import measured, pairs, points, root, samples, sectors, wear
 from studyrunner.report.selection import course_axis
 from studyrunner.result.pairs import OF_PAIRS, of_shown_scene
 from studyrunner.result.view import Result
@@ -47,6 +47,8 @@ class Entry:
             return Missing(self.name, title, as_sentences(drawn))
         named = {"point": ("frequency", "scheme", *shown.varying, *shown.fixed), "course": (axis or "frequency",)}
         where = shown.describe(shown.shown, named.get(self.at, ()))
+        if "contact_sector" in self.scene and shown.has("contact_sector"):
+            where = ", ".join(filter(None, (where, f"sector {int(shown.dataset['contact_sector'][0])}")))
         title = f"{title}: {where}" if where else title
         if isinstance(drawn, Table):
             return replace(drawn, name=self.name, title=title, note=as_sentences(drawn.note, self.caption))
@@ -107,6 +109,13 @@ OF_WEAR = (
     Entry("wear_rate_map", "Wear rate over {over} and {slow}", wear.draw_map, "wear_rate", **_MAP | _RATE),
 )
 """Of results with a slow time: what wears."""
+
+OF_RINGS = (
+    Entry("sector_amplitude_map", "Amplitude over sectors and {over}", sectors.draw_amplitudes, caption=_OTHERS),
+    Entry("sectors", "Sectors of the ring", sectors.draw_sectors, at="point"),
+    Entry("magnification", "Largest amplitude over the mean of all sectors", sectors.draw_magnification),
+)
+"""Of rings with all sectors."""
 
 OF_POINTS = (
     Entry("trends", "Trends along the axes of the study", points.draw_trends, caption="Bars: estimated errors"),

@@ -25,7 +25,7 @@ from studyrunner.report.figures.response import find_loops
 from studyrunner.report.root import body_colours, find_views, read_root
 from studyrunner.report.selection import course_axis
 from studyrunner.result.opening import describe_outcome
-from studyrunner.result.pairs import axes_of_scenes, of_shown_scene, pairs_of_scene
+from studyrunner.result.pairs import axes_of_scenes, of_shown_scene
 from studyrunner.result.view import NO_VOLUME, Result
 from studyrunner.statistics.samples import DRAWN
 from studyrunner.summary.answer import summarise
@@ -289,7 +289,8 @@ def build_root_numbers(result: Result, notes: list[str]) -> dict[str, Any] | Non
     if n_pairs > _MOST_PAIRS:
         notes.append(f"The contact is not on this page in three dimensions: it has {n_pairs} pairs.")
         return None
-    whole = read_root(of_shown_scene(result))
+    scene = of_shown_scene(result)
+    whole = read_root(scene)
     if whole is None:
         return None
     surface = whole.near_contact(_MOST_FACES)
@@ -299,7 +300,7 @@ def build_root_numbers(result: Result, notes: list[str]) -> dict[str, Any] | Non
     views, shown = find_views(surface), result.shown
     seen = sum(view.faces.astype(int) << number for number, view in enumerate(views))
     of_faces = {"nodes": surface.nodes, "faces": surface.faces, "body": surface.body, "flank": surface.flank}
-    pairs = pairs_of_scene(result, shown)[surface.pairs]
+    pairs = np.flatnonzero(np.isin(result.dataset["contact"], scene.dataset["contact"]))[surface.pairs]
     of_contact = {"nodes": surface.contact_nodes, "pairs": pairs, "normals": surface.normals}
     return {
         **{name: encode_floats(values) for name, values in (of_faces | {"seen": np.asarray(seen)}).items()},

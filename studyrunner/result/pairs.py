@@ -27,7 +27,7 @@ Scar = tuple[Floats, Places]
 OF_PAIRS = (*(name for name, entry in COORDINATES.items() if entry.dimensions == ("contact",)), *SCENE["mesh"])
 """Variables that say where the pairs are."""
 
-_EXISTS = "contact_exists"
+_EXISTS, _SECTOR = "contact_exists", "contact_sector"
 _ALIGNED = 0.05  # of the smallest distance between two pairs: pairs are on a line of the grid if they miss it by less
 _LONE, _SLIM = 1e-3, 0.2  # m; width of a single row of pairs, or this part of its length where that is less
 _STRAIGHT = 0.999
@@ -101,9 +101,11 @@ def axes_of_scenes(result: Result, names: Collection[str] = OF_PAIRS) -> tuple[s
 
 
 def of_shown_scene(result: Result, names: Collection[str] = OF_PAIRS) -> Result:
-    """The points whose scene is that of the shown point as far as these variables say, with its contact pairs alone."""
+    """The points whose scene is that of the shown point as far as these variables say, with its contact pairs alone; of
+    a ring those of `worst_sector`.
+    """
     axes, point = axes_of_scenes(result, names), result.shown
-    if not axes and not result.has(_EXISTS):
+    if not axes and not result.has(_EXISTS) and not result.has(_SECTOR):
         return result
     dataset = result.dataset.isel({axis: [point[axis]] for axis in axes})
     for name in filter(result.has, names):
@@ -111,7 +113,16 @@ def of_shown_scene(result: Result, names: Collection[str] = OF_PAIRS) -> Result:
         dataset[name] = variable.isel({axis: 0 for axis in axes if axis in variable.dims}, drop=True)
     if _EXISTS in names and result.has(_EXISTS):
         dataset = dataset.isel(contact=pairs_of_scene(result, point)).drop_vars(_EXISTS)
+    if _SECTOR in names and result.has(_SECTOR):
+        # pairs of all sectors stand at the same places
+        dataset = dataset.isel(contact=np.flatnonzero(dataset[_SECTOR].values == worst_sector(result)))
     return replace(result, dataset=dataset, fixed=(*result.fixed, *(axis for axis in axes if axis in result.varying)))
+
+
+def worst_sector(result: Result) -> int:
+    """The sector of a ring that wears most at the shown point; the first one where none does."""
+    worn = result.at("sector_worn_volume", result.shown, result.last_reached(result.shown)).values
+    return int(np.argmax(np.nan_to_num(worn)))
 
 
 def pairs_of_scene(result: Result, point: Point) -> Places:

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from studyrunner.report import drawing as plot
-from studyrunner.report.contents import AT_THE_END, BANDS, OF_POINTS, OF_WEAR, Entry
+from studyrunner.report.contents import AT_THE_END, BANDS, OF_POINTS, OF_RINGS, OF_WEAR, Entry
 from studyrunner.report.drawing import Drawn, Table
 from studyrunner.result.view import NO_VOLUME, Result
 from studyrunner.units import Scale, scale_for, show_known, show_number, show_percent
@@ -79,6 +79,7 @@ FIGURES = (
     Entry("block_shares", "Wear by block over the missions", draw_blocks, _SHARES, at="point", caption=_WEAR),
     Entry("block_responses", _TITLE, draw_blocks, _RESPONSES, at="point", caption=_VIBRATION),
     *OF_WEAR,
+    *OF_RINGS,
     *OF_POINTS,
     *AT_THE_END,
 )

@@ -1,6 +1,6 @@
 """Figures of wear histories."""
 
-from studyrunner.report.contents import AT_THE_END, BANDS, OF_MEASURED, OF_POINTS, OF_WEAR, ONE, Entry
+from studyrunner.report.contents import AT_THE_END, BANDS, OF_MEASURED, OF_POINTS, OF_RINGS, OF_WEAR, ONE, Entry
 from studyrunner.report.figures import pairs, precision, wear
 from studyrunner.report.figures.response import draw_loops, draw_responses
 
@@ -20,6 +20,7 @@ FIGURES = (
     *OF_WEAR,
     Entry("frequency_response", "Frequency response of one joint, new and worn", draw_responses, needs=_NEEDED),
     Entry("excitation_frequency", "Frequency of the followed resonance", wear.draw_excitation, caption=BANDS),
+    *OF_RINGS,
     *OF_MEASURED,
     Entry("evolution", "Contact that changes with the dissipated energy", wear.draw_evolution, **ONE),
     *OF_POINTS,

@@ -12,6 +12,7 @@ from solver.outcome import SENSITIVE_ERROR, Outcome
 from studyrunner.coordinates import SAMPLE
 from studyrunner.kinds.wear.meshes import compare_meshes
 from studyrunner.kinds.wear.response import describe_response
+from studyrunner.kinds.wear.ring import describe_ring
 from studyrunner.kinds.wear.sought import find_allowable
 from studyrunner.result.pairs import contact_pairs, has_depths, last_depth
 from studyrunner.result.view import NO_MOTION, NO_VOLUME, Point, Result
@@ -39,7 +40,8 @@ def what_came_out(result: Result, stuck: float) -> Iterator[Finding]:
     if sought:
         yield find_allowable(result)
     yield from _wear_and_response(result, stuck)
-    yield from filter(None, (None if sought else _shortest_life(result), compare_meshes(result), _power(result)))
+    life = None if sought else _shortest_life(result)
+    yield from filter(None, (life, compare_meshes(result), _power(result), describe_ring(result)))
 
 
 def _power(result: Result) -> Finding | None:
@@ -182,6 +184,8 @@ def _deepest(result: Result, point: Point, at: int, where: str) -> Finding:
     surface = str(pairs.surface[pair]) if result.has("contact_surface") else ""
     number, place = int(numbers[pair]), pairs.position[pair].tolist()
     text = f"{with_error(depths[pair], error, 'm')} at contact pair {number}" + (f" of {surface}" if surface else "")
+    if result.has("contact_sector"):
+        text += f", sector {int(result.at('contact_sector', point).values[pair])}"
     if np.isfinite(place).all():
         text += f", (x, y, z) = ({', '.join(f'{1e3 * each:.4g}' for each in place)}) mm"
     begun = worn_before(result.study, "wear_depth", point.get(WORN_AXIS, 0))
