@@ -21,6 +21,7 @@ from studyrunner.kinds.wear.kind import LOOP_COMPONENTS, LOOP_PHASES, LOOPS
 from studyrunner.study.mistakes import raise_wrong, scene_errors
 from studyrunner.study.study import Study
 from studyrunner.system.machine import package_digest
+from studyrunner.system.progress import count
 from studyrunner.user_error import UserError, Verbatim
 from studyrunner.values import Wrong
 
@@ -97,7 +98,7 @@ def _ring_of(study: Study, model: ReducedModel) -> ReducedModel:
         if (given := len(getattr(ring, name))) not in (0, model.n_sectors):
             key = "column sector" if ring.file else f"scene.sectors.{name}"
             remedy = f"give each of the {model.n_sectors} sectors of the scene, 0 to {model.n_sectors - 1}, once"
-            raise UserError(place, key, Verbatim(f"{given} sectors"), remedy)
+            raise UserError(place, key, Verbatim(count(given, "sector")), remedy)
     return whole
 
 
