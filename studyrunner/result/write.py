@@ -145,7 +145,7 @@ def _create_all(
     for name, size in sizes.items():
         file.createDimension(name, size)
     of_pairs = sorted((each for each in arrays if each.name.startswith("contact_")), key=lambda each: each.name)
-    auxiliary = of_pairs + [each for each in arrays if each.name.startswith(("sample_", "worn_depth"))]
+    auxiliary = of_pairs + [each for each in arrays if each.name.startswith(("sample_", "sector_", "worn_depth"))]
     designed = {"frequency", *(() if study.design is None else study.design.columns)}
     auxiliary += [each for each in arrays if each.name in designed and each.dimensions != (each.name,)]
     for name, entry in variables.items():

@@ -34,7 +34,7 @@ model = "ring.h5"
 friction_coefficient = 0.3
 sectors = "all"
 [axes]
-frequency = 272.0
+frequency = 280.0
 excitation_amplitude = 3.3
 wear_coefficient = 1e-10
 [slow_time]
@@ -50,17 +50,17 @@ name = "d"
 [scene]
 model = "dovetail_sector"
 mesh = 1
-n_sectors = 4
+n_sectors = 12
 [axes]
 frequency_ratio = 0.999
-excitation_amplitude = 0.3
+excitation_amplitude = 0.02
 [slow_time]
 cycles = 0
 [solver]
 harmonics = 1
 samples = 64
 """
-PATTERN = np.array([0.002, -0.004, 0.006, 0.001, 0.0, -0.003])
+PATTERN = np.array([0.02, -0.013, 0.0, 0.007, -0.018, 0.011])
 
 
 def blades(*columns, header="sector,frequency", sectors=range(N)):
@@ -188,7 +188,7 @@ def test_scenes_that_are_no_ring_are_said_so(folder, ring, capsys):
     (folder / "ring.toml").write_text(dovetail)
     assert "scene.nodal_diameter = 7: use at most n_sectors // 2 = 6" in refused(capsys)
     modes = RING.replace(
-        "frequency = 272.0\nexcitation_amplitude = 3.3\nwear_coefficient = 1e-10", "modal_amplitude = 1e-4"
+        "frequency = 280.0\nexcitation_amplitude = 3.3\nwear_coefficient = 1e-10", "modal_amplitude = 1e-4"
     )
     (folder / "ring.toml").write_text(modes[: modes.index("[slow_time]")])
     assert "scene.sectors: leave it out: nonlinear modes" in refused(capsys)
@@ -300,7 +300,8 @@ def test_equal_sectors_are_one(computed):
 def test_the_result_turns_with_the_pattern(computed):
     pattern, turned = opened(computed, "pattern", "turned")
     np.testing.assert_allclose(pattern.sector_frequency, PATTERN)
-    assert np.ptp(pattern.sector_amplitude[0]) > 0.1 * pattern.sector_amplitude[0].max()
+    for name, least in (("sector_amplitude", 0.01), ("sector_wear_depth", 0.2)):
+        assert np.ptp(pattern[name].values[-1]) > least * pattern[name].values[-1].max()
     for name, rtol in (("sector_amplitude", 1e-5), ("sector_wear_depth", 1e-3), ("sector_worn_volume", 1e-3)):
         wanted, found = np.roll(pattern[name], 2, axis=1), turned[name].values
         np.testing.assert_allclose(found, wanted, rtol=rtol, atol=rtol * wanted.max())
@@ -324,7 +325,7 @@ def test_a_worn_ring_is_computed_again(computed, tmp_path):
 def test_ranks_and_a_run_that_goes_on_give_the_same(computed):
     """A ring is made anew from its sector on each rank."""
     command = ["-m", "studyrunner.cli", "ring.toml", *options(FILE)]
-    both = options("axes.frequency=[268, 272]")
+    both = options("axes.frequency=[276, 280]")
     assert run_to_end(2, [*command, *both, "-o", "ranks.nc"], computed).status == 0
     ended = run_to_end(0, [*command, *both, "-o", "pattern.nc"], computed)
     assert ended.status == 0
@@ -335,7 +336,7 @@ def test_ranks_and_a_run_that_goes_on_give_the_same(computed):
 @pytest.mark.slow
 def test_samples_of_a_ring_and_the_report(computed, monkeypatch):
     monkeypatch.chdir(computed)
-    overrides = (*UNWORN, "axes.frequency=[268, 272]", "scatter={samples=4, sector_frequency={normal={std=0.003}}}")
+    overrides = (*UNWORN, "axes.frequency=[276, 280]", "scatter={samples=4, sector_frequency={normal={std=0.01}}}")
     result = compute("ring.toml", "samples.nc", *overrides)
     assert result.sample_sector_frequency.dims == ("sample", "sector")
     factors = result.amplitude_magnification.squeeze().values
@@ -350,12 +351,13 @@ def test_samples_of_a_ring_and_the_report(computed, monkeypatch):
 @pytest.mark.slow
 def test_a_mirrored_pattern_has_the_mirrored_result(folder):
     """The dovetail is symmetric, and at nodal diameter 0 no wave turns."""
-    pattern = np.array([0.004, 0.001, -0.003, -0.002])
+    pattern = np.random.default_rng(0).uniform(-0.005, 0.005, 12)
+    mirror = -np.arange(12) % 12
     (folder / "dovetail.toml").write_text(DOVETAIL)
     found = []
-    for name, own in (("right", pattern), ("left", pattern[[0, 3, 2, 1]])):
-        (folder / f"{name}.csv").write_text(blades(own, sectors=range(4)))
+    for name, own in (("right", pattern), ("left", pattern[mirror])):
+        (folder / f"{name}.csv").write_text(blades(own, sectors=range(12)))
         found.append(compute("dovetail.toml", f"{name}.nc", f'scene.sectors={{file="{name}.csv"}}').squeeze(drop=True))
     right, left = (each.sector_amplitude.values for each in found)
     assert np.ptp(right) > 0.01 * right.max()
-    np.testing.assert_allclose(left, right[[0, 3, 2, 1]], rtol=1e-5)
+    np.testing.assert_allclose(left, right[mirror], rtol=1e-5)
