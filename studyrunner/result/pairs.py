@@ -120,9 +120,11 @@ def of_shown_scene(result: Result, names: Collection[str] = OF_PAIRS) -> Result:
 
 
 def worst_sector(result: Result) -> int:
-    """The sector of a ring that wears most at the shown point; the first one where none does."""
-    worn = result.at("sector_worn_volume", result.shown, result.last_reached(result.shown)).values
-    return int(np.argmax(np.nan_to_num(worn)))
+    """The sector of a ring that wears most at the shown point, or where none does the one that vibrates most."""
+    last = result.last_reached(result.shown)
+    names = [name for name in ("sector_worn_volume", "sector_amplitude") if result.has(name)]
+    values = [np.nan_to_num(result.at(name, result.shown, last).values) for name in names]
+    return int(next((each for each in values if each.any()), values[0]).argmax())
 
 
 def pairs_of_scene(result: Result, point: Point) -> Places:
