@@ -92,7 +92,9 @@ MISSIONS = Kind(
     always=OF_A_MISSION,
     of_rings={name: _by_mission(name) for name in ("sector_worn_volume", "sector_wear_depth")}
     | {
-        name: replace(entry, dimensions=(*_BLOCKS, *entry.dimensions[1:]), long_name=f"{entry.long_name}, at the end of a block")
+        name: replace(
+            entry, dimensions=(*_BLOCKS, *entry.dimensions[1:]), long_name=f"{entry.long_name}, at the end of a block"
+        )
         for name, entry in OF_RINGS.items()
         if "wear" not in name and "worn" not in name
     },
