@@ -142,6 +142,7 @@ def doubts_of_study(study: Study, facts: SceneFacts | None = None) -> tuple[str,
     wear = [value * factor for value in study.axes.wear_coefficient for factor in factors]
     of_wear = "wear_coefficient times wear.factor" if isinstance(table, WearTable) else "wear_coefficient"
     worn = [depth for part in parts if part.scene.worn for state in part.scene.worn.depth for depth in state]
+    worn += [depth for part in parts if part.scene.ring for depth in part.scene.ring.wear_depth]
     gap = [abs(value) for value in _numbers(parts, "gap")]
     # variants have the axes of the study
     excited = [study, *(block for variant in study.variants or (study,) for block in variant.block_studies)]
