@@ -1,7 +1,7 @@
 """How the joint vibrates: response over frequency (Fig. 9 of the paper), loops of pairs (Figs. 13 to 15)."""
 
 import textwrap
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -57,6 +57,10 @@ def draw_responses(result: Result) -> Drawn:
         return f"{result.no_worn_response or remedy}."
     if course is not None and result.cycles[0] != 0.0:
         return "The file holds no new joint: add 0 to slow_time.outputs."
+    if result.has("sector_amplitude"):
+        # of a ring the sectors that vibrate most
+        most = result.dataset["response_amplitude"].isel(cycle=0).max(result.axes).fillna(0.0).values
+        result = replace(result, dataset=result.dataset.isel(response=np.argsort(-most, kind="stable")))
     lines, failed, left_out = _new_joint(result, course) if course else ([], np.zeros((0, 0), np.bool_), "")
     lines += _recomputed(curves.sel(response=list(result.responses))) if curves is not None else []
     n_panels, crosses = min(len(result.responses), _MOST_RESPONSES), ""

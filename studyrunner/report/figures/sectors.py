@@ -115,6 +115,7 @@ def _of_samples(result: Result, axis: str | None) -> Drawn:
     n_bins = int(np.clip(np.sqrt(factors.size), _FEWEST_BINS, _MOST_BINS))
     panel.hist(factors, n_bins, color=plot.COLOURS[0])
     panel.set(xlabel="largest over mean amplitude", ylabel="samples")
+    panel.yaxis.set_major_locator(MaxNLocator(integer=True))
     middle, high = np.quantile(factors, (0.5, 0.95))
     over = f", each over all values of {axis.replace('_', ' ')}" if axis else ""
     text = f"{factors.size} samples of the new joint{over}: median {middle:.4g}, 95 % below {high:.4g}, at most"
