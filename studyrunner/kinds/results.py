@@ -23,23 +23,22 @@ def deepest(depth: NDArray[np.float64], error: NDArray[np.float64]) -> dict[str,
     return {"wear_depth_max": depth.max(axis=1, initial=0.0), "wear_depth_max_error": of_deepest}
 
 
-def of_sectors(
-    n_sectors: int, response: NDArray[np.complex128], depth: NDArray[np.float64], area: NDArray[np.float64]
-) -> dict[str, NDArray[np.float64]]:
-    """Variables of a ring from responses (..., n_response), depths (n_counts, n_contact), m, and areas, m2, of the
-    pairs, sector by sector.
-    """
+def motion_of_sectors(n_sectors: int, response: NDArray[np.complex128]) -> dict[str, NDArray[np.float64]]:
+    """How the sectors of a ring vibrate: variables from responses (..., n_response), sector by sector."""
     first = response.reshape(*response.shape[:-1], n_sectors, -1)[..., 0]
-    worn, amplitude = depth.reshape(len(depth), n_sectors, -1), np.abs(first)
+    amplitude = np.abs(first)
     with np.errstate(invalid="ignore"):  # where nothing moves
         magnification = amplitude.max(axis=-1) / amplitude.mean(axis=-1)
-    return {
-        "sector_amplitude": amplitude,
-        "sector_phase": np.angle(first),
-        "sector_worn_volume": (worn * area.reshape(n_sectors, -1)).sum(axis=-1),
-        "sector_wear_depth": worn.max(axis=-1),
-        "amplitude_magnification": magnification,
-    }
+    return {"sector_amplitude": amplitude, "sector_phase": np.angle(first), "amplitude_magnification": magnification}
+
+
+def wear_of_sectors(
+    n_sectors: int, depth: NDArray[np.float64], area: NDArray[np.float64]
+) -> dict[str, NDArray[np.float64]]:
+    """How the sectors of a ring wear: variables from depths (n_counts, n_contact), m, and areas, m2, of the pairs."""
+    worn = depth.reshape(len(depth), n_sectors, -1)
+    volume = (worn * area.reshape(n_sectors, -1)).sum(axis=-1)
+    return {"sector_worn_volume": volume, "sector_wear_depth": worn.max(axis=-1)}
 
 
 def describe_target(until: WearTarget | None, reached: float, counted: str, *, whole: bool) -> str:

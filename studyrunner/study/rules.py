@@ -159,8 +159,6 @@ def _ring(study: Study) -> Iterator[Wrong]:
         if study.scene.forced_sector is not None:
             yield Wrong("scene.forced_sector", study.scene.forced_sector, 'give scene.sectors = "all" beside it')
         return
-    if not study.kind.of_rings:
-        yield Wrong("scene.sectors", None, f"leave it out: {study.kind.words} are those of one sector")
     given, once = dict(study.scene.parameters)["friction_coefficient"], "leave it out: scene.sectors gives friction"
     if ring.friction and "friction_coefficient" in study.scene.parameters.model_fields_set and given is not None:
         yield Wrong("scene.friction_coefficient", given, once)

@@ -188,11 +188,6 @@ def test_scenes_that_are_no_ring_are_said_so(folder, ring, capsys):
     dovetail = RING.replace('"ring.h5"', '"dovetail_sector"\nmesh = 1\nn_sectors = 12\nnodal_diameter = 7')
     (folder / "ring.toml").write_text(dovetail)
     assert "scene.nodal_diameter = 7: use at most n_sectors // 2 = 6" in refused(capsys)
-    modes = RING.replace(
-        "frequency = 280.0\nexcitation_amplitude = 3.3\nwear_coefficient = 1e-10", "modal_amplitude = 1e-4"
-    )
-    (folder / "ring.toml").write_text(modes[: modes.index("[slow_time]")])
-    assert "scene.sectors: leave it out: nonlinear modes" in refused(capsys)
 
 
 def forced_beyond(model, capsys):
@@ -349,6 +344,29 @@ def test_samples_of_a_ring_and_the_report(computed, monkeypatch):
         with shown.dataset:
             drawn = {item.name: item for item in draw_report(shown)}
         assert wanted <= {name for name, item in drawn.items() if isinstance(item, Drawing)}
+
+
+@pytest.mark.slow
+def test_missions_have_the_wear_and_vibration_of_each_sector(ring, folder):
+    text = RING.replace("frequency = 280.0\n", "").replace("cycles = 100\noutputs = 3", "missions = 1")
+    text += 'harmonics = 1\nsamples = 64\n[[mission]]\nname = "dwell"\nfrequency = 280.0\ncycles = 10\n'
+    (folder / "ring.toml").write_text(text)
+    found = compute("ring.toml", "ring.nc", FILE).squeeze(drop=True)
+    assert found.sector_amplitude.dims == ("mission", "sector")
+    np.testing.assert_allclose(found.sector_amplitude, found.response_amplitude)
+    np.testing.assert_allclose(found.sector_worn_volume.sum("sector"), found.worn_volume, rtol=1e-12)
+    assert (found.sector_worn_volume[-1] > 0.0).all()
+
+
+@pytest.mark.slow
+def test_a_mode_of_equal_sectors_is_that_of_one(folder):
+    write_scene(one_sector(0), "ring.h5")
+    table, axes = RING[: RING.index("frequency")], "modal_amplitude = {}\n"
+    (folder / "ring.toml").write_text(table + axes.format(6e-5 * np.sqrt(N)))
+    (folder / "one.toml").write_text(table.replace('sectors = "all"\n', "") + axes.format(6e-5))
+    ring, one = (compute(f"{name}.toml", f"{name}.nc").squeeze(drop=True) for name in ("ring", "one"))
+    np.testing.assert_allclose(ring.natural_frequency, one.natural_frequency, rtol=1e-9)
+    np.testing.assert_allclose(ring.sector_amplitude, one.response_amplitude.item(), rtol=1e-6)
 
 
 @pytest.mark.slow

@@ -165,6 +165,7 @@ def test_every_example_is_a_study(text, capsys):
     for name in ("nodes.csv", "blade.pch", "stress.csv"):
         Path(name).touch()
     Path("worn.csv").write_text("cycle,worn_volume_mm3\n1e4,0.1\n", encoding="utf-8")
+    Path("blades.csv").write_text("sector,frequency\n" + "".join(f"{sector},0\n" for sector in range(12)))
     Path("scar.csv").write_text("x_mm,depth_um\n" + "".join(f"{x},1\n" for x in range(5)), encoding="utf-8")
     table = read_toml(text.encode(), "page")
     complete = {"study", "scene"} <= table.keys() and table.keys() & {"axes", "mission"}

@@ -18,7 +18,14 @@ from studyrunner.kinds import task as tasks
 from studyrunner.kinds.estimate import iterations_of_sweep, seconds_of
 from studyrunner.kinds.joint import TaskJoint
 from studyrunner.kinds.missions.kind import OF_A_MISSION
-from studyrunner.kinds.results import deepest, describe_target, first_harmonic, named, of_sectors
+from studyrunner.kinds.results import (
+    deepest,
+    describe_target,
+    first_harmonic,
+    motion_of_sectors,
+    named,
+    wear_of_sectors,
+)
 from studyrunner.points.table import Points
 from studyrunner.study.sections import AUTO
 from studyrunner.study.study import Study
@@ -204,9 +211,9 @@ def _values(task: Mission, history: "MissionHistory", area: NDArray[np.float64])
     whole, target = history.last_mission >= task.missions[-1], ""
     if history.outcome.complete:
         target = describe_target(task.until, history.missions_to_target, "mission", whole=whole)
-    n_sectors, of_ring = task.blocks[0].joint.n_sectors, {}
-    if n_sectors > 1:
-        of_ring = of_sectors(n_sectors, history.response_end[rows], history.wear_depth[rows], area)
+    n, of_ring = task.blocks[0].joint.n_sectors, {}
+    if n > 1:
+        of_ring = motion_of_sectors(n, history.response_end[rows]) | wear_of_sectors(n, history.wear_depth[rows], area)
     own: Mapping[str, object] = {
         **of_ring,
         **{name: getattr(history, name)[rows] for name in (*of_depth, *of_energy)},

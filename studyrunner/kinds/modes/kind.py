@@ -5,7 +5,7 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from studyrunner.kinds.kind import Kind
-from studyrunner.kinds.wear.kind import ASKED, OF_A_HISTORY
+from studyrunner.kinds.wear.kind import ASKED, OF_A_HISTORY, OF_RINGS
 from studyrunner.values import Wrong
 from studyrunner.variables import Variable
 
@@ -71,6 +71,10 @@ MODES = Kind(
     rules=_broken_rules,
     asked=OF_MODES,
     always=OF_A_MODE_POINT,
+    of_rings={
+        name: replace(OF_RINGS[name], dimensions=OF_RINGS[name].dimensions[1:])
+        for name in ("sector_amplitude", "sector_phase", "amplitude_magnification")
+    },
     usual=(*OF_MODES,),
     of_samples=(*OF_MODES,),
     coordinates={"sweep": Variable((), "1", "how the amplitude is reached", _SWEEP)},

@@ -11,7 +11,7 @@ from studyrunner.kinds import task as tasks
 from studyrunner.kinds.estimate import seconds_of
 from studyrunner.kinds.joint import TaskJoint
 from studyrunner.kinds.modes.kind import OF_A_MODE_POINT
-from studyrunner.kinds.results import first_harmonic, named
+from studyrunner.kinds.results import first_harmonic, motion_of_sectors, named
 from studyrunner.points.table import Points
 from studyrunner.study.study import Study
 from studyrunner.system.progress import count
@@ -54,6 +54,7 @@ class Mode(tasks.Task):
         for place, found in follow_mode(model, amplitudes, self.mode, direction, self.settings):
             own = {
                 **first_harmonic(found.response),
+                **motion_of_sectors(self.joint.n_sectors, found.response),
                 "natural_frequency": found.frequency,
                 "natural_frequency_error": found.frequency_error,
                 "damping_ratio_error": found.damping_error,
@@ -80,7 +81,7 @@ def build_tasks(study: Study, points: Points, n_displacements: Sequence[int]) ->
             number=0,
             scenes=(joint.scene,),
             settings=settings,
-            cost=seconds_of(n_unknowns, whole),
+            cost=seconds_of(n_unknowns, whole, joint.n_sectors),
             first_share=first / whole,
             n_unknowns=n_unknowns,
             joint=joint,

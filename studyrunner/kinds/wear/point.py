@@ -8,7 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from solver.outcome import Outcome
-from studyrunner.kinds.results import deepest, describe_target, first_harmonic, named, of_sectors
+from studyrunner.kinds.results import (
+    deepest,
+    describe_target,
+    first_harmonic,
+    motion_of_sectors,
+    named,
+    wear_of_sectors,
+)
 from studyrunner.kinds.task import PointResult
 from studyrunner.kinds.wear.kind import OF_A_HISTORY
 from studyrunner.units import describe_reach
@@ -80,7 +87,8 @@ def build_result(
     }
     of_ring = {}
     if area is not None and task.joint.n_sectors > 1:
-        of_ring = of_sectors(task.joint.n_sectors, history.response, history.wear_depth, area)
+        n = task.joint.n_sectors
+        of_ring = motion_of_sectors(n, history.response) | wear_of_sectors(n, history.wear_depth, area)
     values = _at_counts(history, of_ring, task.variables, slower, rows, reached) | named(
         tuple(OF_A_HISTORY), own, history
     )
