@@ -125,7 +125,7 @@ def find_instability(case: Case, state: State, run: Run, with_switching: bool = 
         return None
     if kind == "unknown":
         return Failure(Outcome.INACCURATE, f"whether the vibration is stable is not known: {found.unknown}")
-    said = f"a small disturbance grows by the factor {abs(found.values[0]):.3g} in each period of the excitation"
+    said = f"a small disturbance grows by the factor {abs(found.values[0]):.4g} in each period of the excitation"
     if not switches:
         said = f"{said}, in the linear structure alone"
     elif kind == "Neimark-Sacker":
