@@ -124,7 +124,7 @@ class JacobianSolver:
         """
         self._resolution, self._corrections = tangent.joint.resolution, ()
         n_rel = tangent.joint.component_index.size
-        # at rest marches do not suffice: 47 shrouded sectors have 1033 solves of 50 products, of which none ends
+        # at rest marches do not suffice: of 47 shrouded sectors 1033 of 1293 solves do not end in 80 products
         dense = dense or n_rel <= SMALL_JOINT or (n_rel <= LARGEST_DENSE and not tangent.joint.basis.orders)
         rough = None if dense else build_ring_factor(tangent, NEUTRAL_SHIFT) or build_period_factor(tangent)
         self._factor = rough or build_dense_factor(tangent, NEUTRAL_SHIFT)
