@@ -60,7 +60,8 @@ class Monodromy(NamedTuple):
     - past (N, p, 3, 12): right-hand side of the law from `du` without contact forces, `du'`, known velocity, `dv'`.
     - by_inner, inner_by_motion, kept: as in `SampledLaw`, the first one also a part of the right-hand side.
     - places (12p,): rows of these four motions, and 4n for a displacement that does not exist.
-    - turn (4n + p q,): rows of a disturbance as seen from the next sector. n_sectors: m. n_blades: of all sectors.
+    - moves: which displacements of the model are the n. turn (4n + p q,): rows of a disturbance as seen from the next
+      sector. n_sectors: m. n_blades: of all sectors.
 
     n and p count the displacements and pairs of all m sectors, N the samples of a period over m.
     A disturbance (4n + p q, j) has displacements and velocities (m per sample), both now and at the sample before, and
@@ -75,6 +76,7 @@ class Monodromy(NamedTuple):
     inner_by_motion: FloatArray
     kept: FloatArray
     places: IntArray
+    moves: BoolArray
     turn: IntArray
     n_sectors: int
     n_blades: int
@@ -168,6 +170,7 @@ def build_monodromy(joint: Joint, at: Evaluation, n_samples: int, n_sectors: int
         inner_by_motion=law.inner_by_motion,
         kept=law.kept,
         places=np.where(place < 0, 4 * n, place + n * np.arange(4)[:, None]).ravel(),
+        moves=moves,
         turn=np.concatenate([np.roll(each, 1, axis=-2).ravel() for each in rows_of_sectors]),
         n_sectors=n_sectors,
         n_blades=joint.model.n_sectors if ring else n_sectors,

@@ -231,7 +231,8 @@ def _integrated(joint: Joint, at: Evaluation, rtol: float, growing_only: bool) -
         n_samples *= 2
     most = 8 * (n_samples if every else min(n_samples, SMALL_SAMPLES))
     while True:
-        values, largest_one = multipliers_of(build_monodromy(joint, at, n_samples, n_sectors), every)
+        monodromy = build_monodromy(joint, at, n_samples, n_sectors)
+        values, largest_one = multipliers_of(monodromy, every)
         values = _sorted(values)
         if not values.size:
             return Multipliers(values, np.inf)
@@ -246,7 +247,10 @@ def _integrated(joint: Joint, at: Evaluation, rtol: float, growing_only: bool) -
         if enough or (growing_only and not grows and len(sizes) == 1) or 2 * n_samples > most:
             wave = None
             if grows and isinstance(joint.model, RingModel):
-                wave = wave_of(largest_one[: _moving(joint, at)], joint.model.n_sectors)
+                # in each sector other pairs may stick
+                motion = np.zeros(monodromy.moves.size, np.complex128)
+                motion[monodromy.moves] = largest_one[: np.count_nonzero(monodromy.moves)]
+                wave = wave_of(motion, joint.model.n_sectors)
             return Multipliers(values, error, wave=wave)
         n_samples *= 2
 

@@ -12,9 +12,11 @@ from solver.forced_response import balance_at_start, frequency_response
 from solver.histories import march_wear
 from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel
 from solver.newton import ring_factor
+from solver.newton.run import Run
 from solver.nonlinear_modes import backbone
 from solver.outcome import Outcome
 from solver.settings import SolverSettings
+from solver.stability import floquet
 from solver.stability.disturbances import build_monodromy
 from solver.stability.floquet import multipliers_of
 from solver.structure.condensation import build_structure, condensed_at, frequency_slope, whole_motion
@@ -227,3 +229,17 @@ def test_a_ring_with_deviating_blades_vibrates_and_grows_as_its_full_matrices():
     assert np.ptp(one) > 0.01 * one.max()
     assert np.abs(one - other).max() <= 1e-3 * other.max()
     assert np.abs(growth - its).max() <= 1e-3
+
+
+@pytest.mark.slow
+def test_a_wave_that_grows_is_named_where_other_pairs_stick_in_each_sector(monkeypatch):
+    monkeypatch.setattr(floquet, "GROWTH", -0.01)  # which every state does then
+    ring = build_ring(one_sector(1), [0.004, -0.007, 0.002, 0.0, -0.003, 0.009])
+    friction, gap = np.array([0.3, 0.25, 0.3, 0.35, 0.3, 0.3]), np.array([0.0, 2.5e-6, 0.0, 1e-6, 0.0, 4e-6])
+    ring = replace(ring, contact=replace(ring.contact, friction_coefficient=friction, gap=ring.contact.gap + gap))
+    settings = SolverSettings(harmonics=5, samples=90)
+    checked = check_case(ring, 3.3, None, "up", settings)
+    _, case, _, state = balance_at_start(checked[0], checked[1], 280.0, "up", settings)
+    n_stuck = np.count_nonzero(floquet.switching_pairs(state.evaluation)[1])
+    assert 0 < n_stuck < N
+    assert floquet.find_multipliers(case, state, Run(1e-8), growing_only=True).wave in range(N // 2 + 1)
