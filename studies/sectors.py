@@ -18,7 +18,7 @@ _TUPLE = BeforeValidator(lambda value: tuple(value) if isinstance(value, list) e
 class Sectors(Table):
     """How the sectors of a ring differ: lists with a number for each, from sector 0 on; () where they do not differ.
 
-    file: that the numbers are from.
+    file: that the numbers are from. wear_depth: of each sector, or of each pair of all sectors.
     """
 
     file: str = Field("", description="CSV file beside the study file with the columns sector, frequency, ...")
@@ -29,7 +29,7 @@ class Sectors(Table):
         (), description="friction coefficient of all pairs of the sector"
     )
     wear_depth: Annotated[tuple[_NotNegative, ...], _TUPLE, Unit("m")] = Field(
-        (), description="wear of all pairs of the sector before the history begins"
+        (), description="wear before the history begins, of all pairs of a sector, or of each pair, sector by sector"
     )
 
 

@@ -5,6 +5,8 @@ columns and their units, `cycle,worn_volume_mm3,standard_deviation_mm3`, and a r
 where material is missing.
 """
 
+import contextlib
+import itertools
 import re
 from collections.abc import Iterator, Mapping
 from itertools import product
@@ -58,7 +60,7 @@ UNITS: Mapping[str, Mapping[str, float]] = {
     "Hz": {"Hz": 1.0, "kHz": 1e3},
     "m_sqrtkg": {"m_sqrtkg": 1.0},
 }
-"""For each unit of the program what a column may be in, with its size; as `genfromtxt` writes names of columns."""
+"""For each unit of the program what a column may be in, with its size; as `read_table` writes names of columns."""
 
 
 class Measurement(Section):
@@ -182,23 +184,22 @@ def read_columns(path: Path, name: str) -> dict[str, object]:
 
     name: of `QUANTITIES`. Raises UserError with file and row.
     """
-    table, quantity = read_table(path), QUANTITIES[name]
+    table, quantity = read_table(path, "x_mm,depth_um"), QUANTITIES[name]
     column, found, over = quantity.column or name, dict[str, NDArray[np.float64]](), ""
-    names = table.dtype.names or ()
     units: dict[str, str] = {each: _ABSCISSAS[each] for each in quantity.over}
     units |= {column: quantity.units, "standard_deviation": quantity.units}
-    for header, (wanted, of) in product(names, units.items()):
+    for header, (wanted, of) in product(table.columns, units.items()):
         match = re.fullmatch(rf"{wanted}s?_?(.*)", header, re.IGNORECASE)
         if match and match[1] in UNITS[of]:
-            found[wanted] = table[header] * UNITS[of][match[1]]
+            found[wanted] = table.numbers(header) * UNITS[of][match[1]]
             over = wanted if wanted in _ABSCISSAS else over
     if not over or column not in found:
         possible = " or ".join(_header(each, _ABSCISSAS[each]) for each in quantity.over)
         remedy = f"give a first line that names {possible}, and {_header(column, quantity.units)}, with their units"
-        raise UserError(str(path), "line 1", Verbatim(f'"{",".join(names)[:60]}"'), remedy)
+        raise UserError(str(path), "line 1", table.header, remedy)
     wrong = np.flatnonzero(~np.isfinite([*found.values()]).all(axis=0))
-    if not table.size or wrong.size:
-        where = f"row {wrong[0] + 2}" if wrong.size else "the file"
+    if not table.lines or wrong.size:
+        where = f"row {table.lines[wrong[0]]}" if wrong.size else "the file"
         raise UserError(str(path), where, None, "give at least one row, and finite numbers in all columns")
     order = np.argsort(found[over], kind="stable")
     values = {"at": found[over], "value": found[column]}
@@ -211,19 +212,58 @@ def _header(name: str, units: str) -> str:
     return f"{name}_{' or _'.join(shown)}" if units != "1" else name
 
 
-def read_table(path: Path) -> NDArray[Any]:
-    """The columns of a CSV file, by their names."""
+class CsvTable(NamedTuple):
+    """Columns of a CSV file by name, each (n,) texts, and the lines (n,) on which the rows stand."""
+
+    columns: dict[str, tuple[str, ...]]
+    lines: tuple[int, ...]
+
+    @property
+    def header(self) -> Verbatim:
+        """The names as they are shown."""
+        return Verbatim(f'"{",".join(self.columns)[:60]}"')
+
+    def numbers(self, name: str) -> NDArray[np.float64]:
+        """A column (n,), NaN where there is no number. Commas that are in a text are decimal ones."""
+        found = np.full(len(self.lines), np.nan)
+        for place, text in enumerate(self.columns[name]):
+            with contextlib.suppress(ValueError):
+                found[place] = float(text.replace(",", "."))
+        return found
+
+
+def read_table(path: Path, example: str) -> CsvTable:
+    """The columns of a CSV file, between commas, semicolons or tabs. A name with a unit, `depth [um]`, is `depth_um`.
+
+    example: of a first line. Raises UserError with file and row.
+    """
     try:
         lines = path.read_text(encoding="utf-8-sig").replace('"', "").splitlines()
-        lines = [line for line in lines if line.strip(" ,")]
-        # rows may end with a comma that the header does not have
-        lines = [",".join(line.split(",")[: lines[0].count(",") + 1]) for line in lines]
-        if not lines:
-            return np.zeros(0)
-        return np.asarray(np.genfromtxt(lines, delimiter=",", names=True, ndmin=1))
-    except (OSError, ValueError) as error:
-        remedy = f"give a CSV file with a first line such as x_mm,depth_um, and numbers between commas: {error}"
+    except (OSError, UnicodeError) as error:
+        reason = getattr(error, "strerror", None) or "it is no text in UTF-8"
+        remedy = f"give a CSV file with a first line such as {example}: {reason}"
         raise UserError(str(path), "the file", None, remedy) from None
+    rows = [(number, line) for number, line in enumerate(lines, 1) if line.strip(" ,;\t")]
+    # numpy writes the first line as a comment; other comments may be above it
+    begin = sum(1 for _ in itertools.takewhile(lambda row: row[1].startswith("#"), rows))
+    begin -= bool(begin and rows[begin:] and re.match(r"[-+.\d\s]", rows[begin][1]))
+    header = rows[begin][1].lstrip("# ") if rows[begin:] else ""
+    rows = [row for row in rows[begin + 1 :] if not row[1].startswith("#")]
+    delimiter = next((each for each in ";\t" if each in header), ",")
+    named = header.rstrip(f"{delimiter} ").replace("%", "percent").split(delimiter) if header else []
+    names = [re.sub(r"\W+", "_", name).strip("_") for name in named]
+    if twice := [name for name in names if names.count(name) > 1]:
+        raise UserError(str(path), f"column {twice[0]}", Verbatim("given twice"), "give each column once")
+    found = []
+    for number, line in rows:
+        cells = [cell.strip() for cell in line.split(delimiter)]
+        # rows may end with a comma that the header does not have
+        if len(cells) < len(names) or any(cells[len(names) :]):
+            remedy = f"give {len(names)} values, one for each column, and numbers with decimal points"
+            raise UserError(str(path), f"row {number}", line, remedy)
+        found.append(cells[: len(names)])
+    columns = zip(*found, strict=True) if found else [()] * len(names)
+    return CsvTable(dict(zip(names, columns, strict=True)), tuple(number for number, _ in rows))
 
 
 class Profile(NamedTuple):

@@ -93,12 +93,17 @@ def _ring_of(study: Study, model: ReducedModel) -> ReducedModel:
     if model.nodal_diameter and study.scene.forced_sector is not None:
         remedy = "give a scene of nodal diameter 0, or leave it out: the travelling wave excites all sectors"
         raise UserError(study.source, "scene.forced_sector", study.scene.forced_sector, remedy)
-    place = str(study.folder / ring.file) if ring.file else study.source
-    for name in ("frequency", "friction", "wear_depth"):
-        if (given := len(getattr(ring, name))) not in (0, model.n_sectors):
-            key = "column sector" if ring.file else f"scene.sectors.{name}"
-            remedy = f"give each of the {model.n_sectors} sectors of the scene, 0 to {model.n_sectors - 1}, once"
-            raise UserError(place, key, Verbatim(count(given, "sector")), remedy)
+    place, n = str(study.folder / ring.file) if ring.file else study.source, model.n_sectors
+    for name, n_pairs in (("frequency", 1), ("friction", 1), ("wear_depth", model.contact.n_contact)):
+        given = len(getattr(ring, name))
+        if given in (0, n, n_pairs * n):
+            continue
+        key = "column sector" if ring.file else f"scene.sectors.{name}"
+        found, remedy = count(given, "sector"), f"give each of the {n} sectors of the scene, 0 to {n - 1}, once"
+        if name == "wear_depth" and given % n == 0:
+            key = "column result" if ring.file else key
+            found, remedy = count(given // n, "pair"), f"give results of one sector, which has {count(n_pairs, 'pair')}"
+        raise UserError(place, key, Verbatim(found), remedy)
     return whole
 
 

@@ -166,7 +166,7 @@ class _OfResult(Section):
     model_config = ConfigDict(extra="allow")
 
     result: str = Field(description="path of a result file; or depth in place of a result")
-    cycle: Axis[NotNegative] = Field(description="cycle counts of the result")
+    cycle: Axis[NotNegative] = Field((), description="cycle counts of the result, the last one if not given")
 
 
 def read_worn(table: object, source: str, folder: Path) -> Worn:
@@ -187,10 +187,10 @@ def read_worn(table: object, source: str, folder: Path) -> Worn:
     check_result_file(path, str(path))
     with result_errors(str(path)), xr.open_dataset(path.absolute(), engine="netcdf4", decode_times=False) as dataset:
         of_point = given.model_extra or {}, given.cycle, source
-        found = {"depth": _worn_in(dataset, "wear_depth", *of_point).tolist()}
+        found = {"depth": _worn_in(dataset, "wear_depth", *of_point).tolist(), "result": given.result}
         if "dissipated_energy" in dataset:
             found["energy"] = _worn_in(dataset, "dissipated_energy", *of_point).tolist()
-        return Worn(**found, cycle=given.cycle, result=given.result)
+        return Worn.model_validate(found | ({"cycle": given.cycle} if given.cycle else {}))
 
 
 def worn_before(study: Mapping[str, Any], name: str, state: int) -> NDArray[np.float64]:
@@ -231,6 +231,7 @@ def _worn_in(dataset: "xr.Dataset", name: str, point: Mapping[str, object], cycl
     places = {name: place(name, point.get(name), dataset[name].values.tolist()) for name in axes}
     # the coordinate of a study to the end numbers its outputs
     counts = dataset.get("cycle_count", dataset["cycle"]).isel(places, missing_dims="ignore").values.tolist()
+    cycle = cycle or counts[-1:]
     states = [place("cycle", count, counts) for count in cycle]
     chosen = depths.isel({**places, "cycle": states}).values.astype(np.float64)
     if "contact_exists" in dataset:  # its scenes differ in their pairs

@@ -104,6 +104,17 @@ def test_columns_are_read_in_any_order_and_unit(folder, ring):
     assert read_study("again.toml").scene == study.scene
 
 
+def test_files_of_spreadsheets_and_of_numpy(folder, ring):
+    table = blades(100.0 * PATTERN, header="sector,frequency [%]")
+    for text in (table, table.replace(",", ";").replace(".", ","), f"# wheel 3\n# {table}\n", f"\ufeff{table}"):
+        (folder / "blades.csv").write_text(text, encoding="utf-8")
+        np.testing.assert_allclose(read(FILE).scene.ring.frequency, PATTERN, rtol=1e-12)
+    more = FILE.replace("}", ", friction=[0.1, 0.2, 0.3, 0.4, 0.5, 0.6]}")
+    (folder / "ring.toml").write_text(RING.replace("friction_coefficient = 0.3\n", ""))
+    assert read(more).scene.ring.friction[5] == 0.6
+    assert read(more).scene.ring.frequency == read(FILE).scene.ring.frequency
+
+
 BAD_FILES = {
     "sector 4 is missing": (blades(PATTERN[:5], sectors=[0, 1, 2, 3, 5]), "blades.csv: column sector"),
     "given twice": (blades(PATTERN, sectors=[0, 1, 2, 2, 4, 5]), "column sector, row 5 = 2"),
@@ -112,13 +123,20 @@ BAD_FILES = {
     "a sector too few": (blades([0.0] * 5, sectors=range(5)), "blades.csv: column sector = 5 sectors"),
     "too far": (
         blades([0.0, 0.21, 0.0, 0.0, 0.0, 0.0]),
-        "column frequency, row 3 = 0.21: give a number of -0.2 to 0.2",
+        'column frequency, row 3 = "0.21": give a number of -0.2 to 0.2',
     ),
+    "too far in percent": (
+        blades([0.0, -21, 0.0, 0.0, 0.0, 0.0], header="sector,frequency [%]"),
+        'column frequency_percent, row 3 = "-21": give a number of -20 to 20',
+    ),
+    "decimal commas": ("sector,frequency\n0,0,01\n", 'blades.csv: row 2 = "0,0,01": give 2 values'),
     "no number": (blades([0.0, np.nan, 0.0, 0.0, 0.0, 0.0]), "column frequency, row 3"),
-    "negative friction": (blades([-0.1] * 6, header="sector,friction"), "column friction, row 2 = -0.1"),
+    "negative friction": (blades([-0.1] * 6, header="sector,friction"), 'column friction, row 2 = "-0.1"'),
     "unknown column": (blades(PATTERN, header="sector,freqency"), "column freqency"),
     "unknown unit": (blades(PATTERN, header="sector,wear_depth_inch"), "column wear_depth_inch"),
-    "no sectors": (blades(PATTERN, header="blade,frequency"), "column blade"),
+    "a column twice": (blades(PATTERN, PATTERN, header="sector,frequency,frequency"), "column frequency: given twice"),
+    "no sectors": (blades(PATTERN, header="blade,frequency"), 'line 1 = "blade,frequency": give a first line'),
+    "no result": ("sector,result\n0,\n1,none.nc\n", 'column result, row 3 = "none.nc": give the path of a result'),
     "nothing beside": ("sector\n0\n1\n", "blades.csv: line 1"),
     "empty": ("", "blades.csv: line 1"),
 }
@@ -140,11 +158,30 @@ def test_a_wrong_file_is_named_with_column_and_row(folder, ring, capsys, case):
     assert words in refused(capsys, FILE)
 
 
+def test_a_sector_begins_with_the_wear_of_a_result(folder, ring, capsys, monkeypatch):
+    monkeypatch.setattr(
+        "studyrunner.sectors.read_worn",
+        lambda table, *_: SimpleNamespace(depth=(tuple(1e-6 * np.arange(1.0, 1.0 + int(table["result"][0]))),)),
+    )
+    rows = ["0,0,", "2,1,1.nc", "1,0.5,", "3,0,1.nc", "4,0,", "5,0,"]
+    head = "sector,wear_depth_um,result\n"
+    (folder / "blades.csv").write_text(head + "\n".join(rows))
+    np.testing.assert_allclose(read(FILE).scene.ring.wear_depth, [0.0, 5e-7, 2e-6, 1e-6, 0.0, 0.0])
+    (folder / "blades.csv").write_text(head + "\n".join(rows).replace("1.nc", "2.nc"))
+    wanted = np.array([[0.0, 0.0], [5e-7, 5e-7], [2e-6, 3e-6], [1e-6, 2e-6], [0.0, 0.0], [0.0, 0.0]])
+    np.testing.assert_allclose(read(FILE).scene.ring.wear_depth, wanted.ravel())
+    assert "column result = 2 pairs: give results of one sector, which has 1 pair" in refused(capsys, FILE)
+    (folder / "blades.csv").write_text(head + "\n".join(rows).replace("1.nc", "2.nc", 1))
+    assert "row 5" in (said := refused(capsys, FILE))
+    assert "the first one has 2 pairs, this one 1" in said
+
+
 DRAWN = "scatter={samples=4, sector_frequency={normal={std=0.01}}}"
 BAD_KEYS = {
     'scene.sectors={file="none.csv"}': "scene.sectors.file",
     "scene.sectors=some": "scene.sectors",
     "scene.sectors={frequency=[0.3, 0, 0, 0, 0, 0]}": "scene.sectors.frequency = 0.3",
+    'scene.sectors={file="blades.csv", frequency=[0.1]}': "scene.sectors.frequency: given twice: leave it out",
     "scene.sectors={frequency=[0.1]}": "scene.sectors.frequency = 1 sector: give each of the 6 sectors",
     "scene.forced_sector=2": "scene.forced_sector = 2: give a scene of nodal diameter 0",
     "scene.sectors={friction=[0.3, 0.3, 0.3, 0.3, 0.3, 0.3]}": "scene.friction_coefficient = 0.3: leave it out",
@@ -307,6 +344,18 @@ def test_the_result_turns_with_the_pattern(computed):
     (finding,) = [each for each in said.findings if each.name == "ring"]
     assert finding.values["wears_most"] == int(pattern.sector_worn_volume.values[-1].argmax())
     assert finding.values["vibrates_most_new"] == int(pattern.sector_amplitude.values[0].argmax())
+
+
+@pytest.mark.slow
+def test_a_ring_goes_on_from_a_result_of_one_sector(computed, monkeypatch):
+    monkeypatch.chdir(computed)
+    names = ["one.nc" if sector in (1, 4) else "" for sector in range(N)]
+    Path("worn.csv").write_text("sector,result\n" + "".join(f"{s},{name}\n" for s, name in enumerate(names)))
+    depth = opened(computed, "one")[0].wear_depth_max[-1].item()
+    overrides = (*UNWORN, FILE.replace("blades", "worn"))
+    assert read(*overrides).scene.ring.wear_depth == pytest.approx([depth if name else 0.0 for name in names])
+    found = compute("ring.toml", "goes_on.nc", *overrides).squeeze(drop=True)
+    assert found.sector_amplitude.std() > 1e-3 * found.sector_amplitude.mean()
 
 
 @pytest.mark.slow
