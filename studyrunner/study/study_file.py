@@ -144,7 +144,10 @@ def _check_study(table: Mapping[str, object], origin: Origin, design: Design | N
         remedy = f"leave it out, or {others[0].marker}: a study is of {kind.words} or of {others[0].words}"
         raise UserError(source, kind.marker, None, remedy)
     worn = None if worn is None else read_worn(worn, source, origin.path.parent)
-    if issubclass(parameters, OfRing) and "sectors" in tables["scene"]:
+    for key in OfRing.model_fields.keys() & tables["scene"].keys() - parameters.model_fields.keys():
+        remedy = f"leave it out: {model} is no sector of a ring"
+        raise UserError(source, f"scene.{key}", tables["scene"][key], remedy)
+    if "sectors" in tables["scene"]:
         tables["scene"]["sectors"] = read_sectors(tables["scene"]["sectors"], source, origin.path.parent)
     if "measured" in tables:
         tables["measured"] = read_measured(tables["measured"], source, origin.path.parent)

@@ -221,7 +221,7 @@ def test_scenes_that_are_no_ring_are_said_so(folder, ring, capsys):
     for override in (FILE, DRAWN):
         assert "give the dataset blade in each group nd/<k>" in refused(capsys, override)
     (folder / "ring.toml").write_text(RING.replace('"ring.h5"', '"sdof_slider"'))
-    assert "scene.sectors" in refused(capsys)
+    assert 'scene.sectors = "all": leave it out: sdof_slider is no sector' in refused(capsys)
     dovetail = RING.replace('"ring.h5"', '"dovetail_sector"\nmesh = 1\nn_sectors = 12\nnodal_diameter = 7')
     (folder / "ring.toml").write_text(dovetail)
     assert "scene.nodal_diameter = 7: use at most n_sectors // 2 = 6" in refused(capsys)
@@ -327,6 +327,9 @@ def test_equal_sectors_are_one(computed):
     assert not ring.sector_frequency.any()
     assert "sector" not in one.dims
     assert {*ring.data_vars} - {*one.data_vars} == {*WEAR.of_rings}
+    (finding,) = [each for each in open_result(computed / "equal.nc").fretwear.summary().findings if each.name == "ring"]
+    assert finding.text.startswith("all sectors wear alike, ")
+    assert finding.text.count("all sectors vibrate alike") == 1
 
 
 @pytest.mark.slow

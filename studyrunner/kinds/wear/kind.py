@@ -131,7 +131,10 @@ OF_RINGS = {
     "sector_worn_volume": Variable(_SECTORS, "m3", "worn volume of the sector", "Sums up to worn_volume."),
     "sector_wear_depth": Variable(_SECTORS, "m", "largest wear depth of any pair of the sector"),
     "amplitude_magnification": Variable(
-        _CYCLE, "1", "largest sector_amplitude over the mean of all sectors", "1 where all sectors vibrate alike."
+        _CYCLE,
+        "1",
+        "largest sector_amplitude over the mean of all sectors",
+        "1 where all sectors vibrate alike. Whitehead's factor is over the peak of a ring of equal sectors instead.",
     ),
 }
 """Those of a ring of sectors, `scene.sectors`."""
