@@ -18,7 +18,6 @@ from studyrunner.kinds.table import KINDS
 from studyrunner.kinds.wear.kind import FOLLOWED_FREQUENCY, OF_EVOLUTION
 from studyrunner.measured import QUANTITIES, read_measured
 from studyrunner.scatter import flat_table
-from studyrunner.sectors import read_sectors
 from studyrunner.study import scene_axes, sections
 from studyrunner.study.design import Design, read_archived_design, read_design
 from studyrunner.study.mistakes import check_tables, keys_as_given, nearest_name, raise_wrong
@@ -26,6 +25,7 @@ from studyrunner.study.overrides import override, with_design
 from studyrunner.study.room import with_room_for_wear
 from studyrunner.study.rules import broken_rules
 from studyrunner.study.scene_section import WORN_AXIS, Origin, SceneSection, find_scene, read_source, read_worn
+from studyrunner.study.sectors import read_sectors
 from studyrunner.study.study import Study
 from studyrunner.study.text import SCENE_GROUP, format_toml, read_archived, read_toml
 from studyrunner.user_error import UserError, Verbatim

@@ -160,7 +160,7 @@ def test_a_wrong_file_is_named_with_column_and_row(folder, ring, capsys, case):
 
 def test_a_sector_begins_with_the_wear_of_a_result(folder, ring, capsys, monkeypatch):
     monkeypatch.setattr(
-        "studyrunner.sectors.read_worn",
+        "studyrunner.study.sectors.read_worn",
         lambda table, *_: SimpleNamespace(depth=(tuple(1e-6 * np.arange(1.0, 1.0 + int(table["result"][0]))),)),
     )
     rows = ["0,0,", "2,1,1.nc", "1,0.5,", "3,0,1.nc", "4,0,", "5,0,"]
@@ -327,7 +327,8 @@ def test_equal_sectors_are_one(computed):
     assert not ring.sector_frequency.any()
     assert "sector" not in one.dims
     assert {*ring.data_vars} - {*one.data_vars} == {*WEAR.of_rings}
-    (finding,) = [each for each in open_result(computed / "equal.nc").fretwear.summary().findings if each.name == "ring"]
+    findings = open_result(computed / "equal.nc").fretwear.summary().findings
+    (finding,) = [each for each in findings if each.name == "ring"]
     assert finding.text.startswith("all sectors wear alike, ")
     assert finding.text.count("all sectors vibrate alike") == 1
 

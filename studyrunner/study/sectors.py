@@ -98,8 +98,8 @@ def _worn(path: Path, table: CsvTable, folder: Path) -> FloatArray:
             except UserError as error:
                 raise UserError(str(path), where, name, error.remedy) from None
             if first and len(found[place]) != len(first):
-                remedy = f"give results of one scene: the first one has {len(first)} pairs, this one {len(found[place])}"
-                raise UserError(str(path), where, name, remedy)
+                both = f"the first one has {len(first)} pairs, this one {len(found[place])}"
+                raise UserError(str(path), where, name, f"give results of one scene: {both}")
     worn = np.zeros((len(table.lines), max(map(len, found.values()), default=1)))
     for place, depths in found.items():
         worn[place] = depths
