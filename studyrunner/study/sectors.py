@@ -26,18 +26,18 @@ _COLUMNS = {
 _ALL = "sector, frequency or frequency_percent, friction, wear_depth_um, result"
 
 
-def read_sectors(given: object, source: str, folder: Path) -> object:
-    """The key with the numbers of its file; as it is where it names none. folder: relative paths start here.
+def read_sectors(given: object, source: str, folder: Path, *, in_result: bool) -> object:
+    """The key with the numbers of its file; as it is where it names none, or a result has them. folder: relative paths
+    start here. in_result: whether the key is that of a result.
 
     Raises UserError where a file is not there or not right: with the column, and the row.
     """
     if not isinstance(given, Mapping) or "file" not in given:
         return given
     path = folder / str(given["file"])
+    if given.keys() != {"file"} and (in_result or not path.is_file()):
+        return given
     if not path.is_file():
-        if given.keys() != {"file"}:
-            # as a result has it, the numbers are known
-            return given
         raise UserError(source, "scene.sectors.file", given["file"], "give the path of a CSV file that is there")
     found = _read_columns(path, folder)
     for name, values in found.items():

@@ -148,7 +148,8 @@ def _check_study(table: Mapping[str, object], origin: Origin, design: Design | N
         remedy = f"leave it out: {model} is no sector of a ring"
         raise UserError(source, f"scene.{key}", tables["scene"][key], remedy)
     if "sectors" in tables["scene"]:
-        tables["scene"]["sectors"] = read_sectors(tables["scene"]["sectors"], source, origin.path.parent)
+        own, in_result = tables["scene"]["sectors"], origin.archived is not None
+        tables["scene"]["sectors"] = read_sectors(own, source, origin.path.parent, in_result=in_result)
     if "measured" in tables:
         tables["measured"] = read_measured(tables["measured"], source, origin.path.parent)
     solver_axes = tuple(key for key in sections.SOLVER_AXES if key in tables["axes"])

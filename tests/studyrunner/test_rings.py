@@ -351,8 +351,10 @@ def test_the_result_turns_with_the_pattern(computed):
 
 
 @pytest.mark.slow
-def test_a_ring_goes_on_from_a_result_of_one_sector(computed, monkeypatch):
+def test_results_know_their_sectors_and_begin_others(computed, monkeypatch):
     monkeypatch.chdir(computed)
+    Path("turned.csv").write_text(blades(PATTERN))  # a result has the numbers that it was computed with
+    np.testing.assert_allclose(read_study("turned.nc").scene.ring.frequency, np.roll(PATTERN, 2), atol=1e-12)
     names = ["one.nc" if sector in (1, 4) else "" for sector in range(N)]
     Path("worn.csv").write_text("sector,result\n" + "".join(f"{s},{name}\n" for s, name in enumerate(names)))
     depth = opened(computed, "one")[0].wear_depth_max[-1].item()
