@@ -142,12 +142,14 @@ def doubts_of_study(study: Study, facts: SceneFacts | None = None) -> tuple[str,
     wear = [value * factor for value in study.axes.wear_coefficient for factor in factors]
     of_wear = "wear_coefficient times wear.factor" if isinstance(table, WearTable) else "wear_coefficient"
     worn = [depth for part in parts if part.scene.worn for state in part.scene.worn.depth for depth in state]
-    worn += [depth for part in parts if part.scene.ring for depth in part.scene.ring.wear_depth]
+    rings = [part.scene.ring for part in parts if part.scene.ring]
+    worn += [depth for ring in rings for depth in ring.wear_depth]
     gap = [abs(value) for value in _numbers(parts, "gap")]
     # variants have the axes of the study
     excited = [study, *(block for variant in study.variants or (study,) for block in variant.block_studies)]
     amplitude = [value for part in excited for value in part.axes.excitation_amplitude]
     friction, speed = _numbers(parts, "friction_coefficient"), _numbers(parts, "rotation_speed")
+    friction += [value for ring in rings for value in ring.friction]
     lengths, deep = {"mm": 1e-3, "um": 1e-6}, "deeper than joints wear, some hundred um"
     depth, volume = ("m", 0.0, 1e-3, lengths), ("m3", 0.0, 1e-3, {"mm3": 1e-9})
     stuck, own = 0.0 if facts is None else facts.stuck_frequency, _frequencies(study, excited)

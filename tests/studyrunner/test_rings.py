@@ -235,6 +235,15 @@ def forced_beyond(model, capsys):
 # --- what is made of it ---
 
 
+def test_friction_and_wear_of_sectors_that_are_hardly_meant_are_asked_for(folder, ring, capsys):
+    (folder / "blades.csv").write_text(blades([30.0] * N, [20.0] * N, header="sector,friction,wear_depth_mm"))
+    (folder / "ring.toml").write_text(RING.replace("friction_coefficient = 0.3\n", ""))
+    assert main([ring, "--plan", *options(FILE)]) == 0
+    said = "".join(capsys.readouterr())
+    assert "scene.worn 0.02 m" in said
+    assert "friction_coefficient 30" in said
+
+
 def test_rings_share_the_model_of_a_sector(ring):
     study = read(FILE, DRAWN)
     scenes = find_scenes(study)
