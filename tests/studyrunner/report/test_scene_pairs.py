@@ -133,7 +133,7 @@ def test_the_measured_profile_is_drawn_beside_it(tmp_path):
     [
         ("x,depth\n1,2\n", "line 1"),
         ("x_mm,depth_um\n0,1\n1,deep\n", "row 3"),
-        ("x_mm;depth_um\n1;2\n", "x_mm,depth_um"),
+        ("x_mm|depth_um\n1|2\n", "line 1"),
         ("x_mm,depth_um\n", "row"),
         ("x_mm,depth_um\n1,nan\n", "finite"),
     ],
