@@ -16,7 +16,8 @@ differently. After a period over m each sector is where the next one was, with t
 
 from collections.abc import Iterator
 from dataclasses import replace
-from typing import NamedTuple
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 from numba import njit
@@ -28,9 +29,10 @@ from solver.contact.element import SampledLaw
 from solver.harmonic_balance.dlft import Balance, Evaluation
 from solver.model import BoolArray, ComplexArray, FloatArray, IntArray, LinearModel, ReducedModel
 from solver.settings import FEWEST_SAMPLES
+from solver.stability.ring_steps import RingSteps, build_steps
 from solver.structure.fourier import build_basis, derivative
 from solver.structure.joint import Joint
-from solver.structure.ring import RingModel
+from solver.structure.ring import RingModel, RingStructure
 
 SMALL_SAMPLES = 512
 """Samples of the law in a period of a small joint: 72 scenes with one pair lie on the right side of 1, most within
@@ -55,7 +57,7 @@ class Monodromy(NamedTuple):
     """Integration of disturbances through N samples of a period, with n displacements and p switching pairs.
 
     - response (n, 2n): motion without contact forces from the known parts of acceleration and velocity, m per sample.
-    - spread (n, 3p): motion under unit contact forces, m/N.
+      spread (n, 3p): motion under unit contact forces, m/N. Of a ring its steps by waves, and none.
     - inverse (N, 3p, 3p): contact forces from the right-hand side of the law.
     - past (N, p, 3, 12): right-hand side of the law from `du` without contact forces, `du'`, known velocity, `dv'`.
     - by_inner, inner_by_motion, kept: as in `SampledLaw`, the first one also a part of the right-hand side.
@@ -68,8 +70,8 @@ class Monodromy(NamedTuple):
     the inner states of the pairs.
     """
 
-    response: FloatArray
-    spread: FloatArray
+    response: Any
+    spread: Any
     inverse: FloatArray
     past: FloatArray
     by_inner: FloatArray
@@ -82,8 +84,34 @@ class Monodromy(NamedTuple):
     n_blades: int
 
 
+def passed(of: Monodromy, disturbance: FloatArray) -> FloatArray:
+    """Disturbances (4n + p q, j) a period over m later."""
+    return _pass_period(of, disturbance) if of.spread is not None else _pass_period_of_ring(of, disturbance)
+
+
+def _pass_period_of_ring(of: Monodromy, disturbance: FloatArray) -> FloatArray:
+    """As `_pass_period`."""
+    steps: RingSteps = of.response
+    width = disturbance.shape[1]
+    n, (n_pairs, n_inner) = steps.n_moving, of.kept.shape[1:]
+    inner, (now, before, speed, speed_before) = disturbance[4 * n :], disturbance[: 4 * n].reshape(4, n, width)
+    nothing = np.zeros((1, width))
+    for inverse, past, by_inner, by_motion, kept in zip(
+        of.inverse, of.past, of.by_inner, of.inner_by_motion, of.kept, strict=True
+    ):
+        known = 0.5 * before - 2.0 * now
+        free = steps.motion(steps.by_given, 1.5 * known + 0.5 * speed_before - 2.0 * speed, known)
+        of_pairs = np.concatenate([free, now, known, speed, nothing])[of.places].reshape(n_pairs, 12, width)
+        right = past @ of_pairs + by_inner @ inner.reshape(n_pairs, n_inner, width)
+        after = free - steps.motion(steps.by_force, inverse @ right.reshape(-1, width))
+        moved = np.concatenate([after, nothing])[np.minimum(of.places.reshape(-1, 4, 3)[:, 0], n)]
+        inner = (by_motion @ moved + kept[:, :, None] * inner.reshape(n_pairs, n_inner, width)).reshape(-1, width)
+        now, before, speed, speed_before = after, now, 1.5 * after + known, speed
+    return np.concatenate([now, before, speed, speed_before, inner])[of.turn]
+
+
 @njit(cache=True)
-def pass_period(of: Monodromy, disturbance: FloatArray) -> FloatArray:
+def _pass_period(of: Monodromy, disturbance: FloatArray) -> FloatArray:
     """Disturbances (4n + p q, j) a period over m later. Compiled: for small joints a tenth of the time."""
     n, n_rows, width, n_inner = of.response.shape[0], of.inverse.shape[1], disturbance.shape[1], of.kept.shape[2]
     # rows of now, before, speed, speed_before; and of after, now, known, speed
@@ -138,16 +166,19 @@ def build_monodromy(joint: Joint, at: Evaluation, n_samples: int, n_sectors: int
     steps = -(-n_samples // (n_sectors * apart)) * apart
     fine = replace(joint, basis=build_basis(joint.basis.orders, steps * n_sectors))
     state = Balance(fine, at.start_history, at.wear_depth, energy=at.energy).evaluate(at.predicted_h)
-    switching, stuck = switching_pairs(state)
+    model, (switching, stuck) = stiffened(joint.model, joint.contact), switching_pairs(state)
+    waves = model.linear[0] if isinstance(model.linear[0], RingStructure) else None
+    if waves:
+        # in each wave the displacements that move are those of one sector
+        open_ones, stuck = (_of_all(each, len(waves.waves)) for each in (~switching & ~stuck, stuck))
+        switching = ~open_ones & ~stuck
     dofs, moves = joint.contact.dofs, moving(joint, stuck)
-    mass, damping, stiffness = _of_sectors(stiffened(joint.model, joint.contact), moves, n_sectors)
-    inertia, drag = mass / fine.law.sample_step**2, damping / fine.law.sample_step
-    compliance = np.asarray(np.linalg.inv(2.25 * inertia + 1.5 * drag + stiffness), np.float64)
     # displacements of the switching pairs among those that move, -1 for none
-    n, first = len(mass), np.count_nonzero(moves) * np.arange(n_sectors)[:, None, None]
+    n, first = np.count_nonzero(moves) * n_sectors, np.count_nonzero(moves) * np.arange(n_sectors)[:, None, None]
     place = np.where(dofs[switching] >= 0, first + (np.cumsum(moves) - 1)[dofs[switching]], -1).reshape(-1, 1, 3)
-    there, rows = place.ravel() >= 0, place.ravel()
-    spread = np.where(there, compliance[rows].T, 0.0)
+    rows = place.ravel()
+    build = partial(build_steps, waves) if waves else partial(_dense_steps, model, n_sectors)
+    response, spread, flexibility = build(moves, rows, fine.law.sample_step)
     sampled = list(vars(fine.law.sampled(state, np.flatnonzero(switching))).values())
     if ring:
         # the structure of a ring is taken at one time, at which each of its sectors has another phase
@@ -162,9 +193,9 @@ def build_monodromy(joint: Joint, at: Evaluation, n_samples: int, n_sectors: int
     )
     parts = (-law.by_motion - 1.5 * law.by_speed, law.by_last_motion, -law.by_speed, law.by_last_speed)
     return Monodromy(
-        response=-compliance @ np.hstack([inertia, drag]),
-        spread=np.ascontiguousarray(spread),
-        inverse=_inverse_of_law(law, np.where(there[:, None], spread[rows], 0.0)),
+        response=response,
+        spread=spread,
+        inverse=_inverse_of_law(law, flexibility),
         past=np.concatenate(parts, axis=3),
         by_inner=law.by_inner,
         inner_by_motion=law.inner_by_motion,
@@ -175,6 +206,23 @@ def build_monodromy(joint: Joint, at: Evaluation, n_samples: int, n_sectors: int
         n_sectors=n_sectors,
         n_blades=joint.model.n_sectors if ring else n_sectors,
     )
+
+
+def _of_all(pairs: BoolArray, n_sectors: int) -> BoolArray:
+    """Pairs (N n,) of which all sectors are among the given ones."""
+    return np.tile(pairs.reshape(n_sectors, -1).all(axis=0), n_sectors)
+
+
+def _dense_steps(
+    model: ReducedModel, n_sectors: int, moves: BoolArray, rows: IntArray, step: float
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """`response`, `spread`, and motion (3p, 3p) of the switching pairs under their unit forces, m/N."""
+    mass, damping, stiffness = _of_sectors(model, moves, n_sectors)
+    inertia, drag = mass / step**2, damping / step
+    compliance = np.asarray(np.linalg.inv(2.25 * inertia + 1.5 * drag + stiffness), np.float64)
+    spread = np.where(rows >= 0, compliance[rows].T, 0.0)
+    flexibility = np.where(rows[:, None] >= 0, spread[rows], 0.0)
+    return -compliance @ np.hstack([inertia, drag]), np.ascontiguousarray(spread), flexibility
 
 
 def _of_sectors(model: ReducedModel, moves: BoolArray, n_sectors: int) -> Iterator[FloatArray]:

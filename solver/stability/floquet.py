@@ -44,7 +44,7 @@ from solver.stability.disturbances import (
     hill_multipliers,
     linear_exponents,
     moving,
-    pass_period,
+    passed,
     switching_pairs,
 )
 from solver.stability.ring_state import in_ring, knows_ring, wave_of
@@ -66,10 +66,6 @@ harmonics change means and first harmonics by up to 3 %. With 0.2 blocks, waves 
 MOST_ROWS = 600
 """Largest number of displacements of switching pairs in all sectors: 200 pairs take 0.4 GB and 10 s. Half and twice:
 ring and damper are equal."""
-
-LARGEST_RING = 1000
-"""Displacements that move, in all sectors of a ring, up to which its disturbances are integrated. With 820 (12 dovetail
-sectors of 16 pairs) 130 periods take 6 s, a sixth of the time of the sweep to the state; with 2000 one takes 1 s."""
 
 SCATTER = 0.035
 """Least error of growing multipliers of a large joint. Underplatform damper, nodal diameter 2, 274 Hz, where nearly all
@@ -152,8 +148,6 @@ def find_multipliers(case: Case, state: State, run: Run, *, growing_only: bool =
     most = MOST_ROWS // (3 * n_sectors)
     if np.count_nonzero(switching) > most:
         return Multipliers(nothing, np.inf, f"more than {most} pairs slip or open in a part of the period")
-    if isinstance(joint.model, RingModel) and _moving(joint, at) > LARGEST_RING:
-        return Multipliers(nothing, np.inf, f"more than {LARGEST_RING} displacements of the ring move")
     if not _bounces(joint, at):
         return _integrated(joint, at, case.settings.rtol, growing_only)
     sharp = _sharper(case, state, run)
@@ -219,10 +213,8 @@ def _sorted(values: ComplexArray) -> ComplexArray:
 def _integrated(joint: Joint, at: Evaluation, rtol: float, growing_only: bool) -> Multipliers:
     """Multipliers by integration in time; samples are doubled until the first one is known, or its side of 1."""
     sizes, rows = list[float](), 3 * np.count_nonzero(switching_pairs(at)[0])
-    if knows_ring(joint.model):
-        n_sectors = joint.model.n_sectors
-        if n_sectors * rows <= MOST_ROWS and n_sectors * _moving(joint, at) <= LARGEST_RING:
-            joint, at = in_ring(joint, at)
+    if knows_ring(joint.model) and joint.model.n_sectors * rows <= MOST_ROWS:
+        joint, at = in_ring(joint, at)
     n_sectors = _sectors(joint, at)
     every = n_sectors * _moving(joint, at) <= SMALL_JOINT
     n_samples = _samples(joint, at) // (1 if growing_only else 2)
@@ -282,18 +274,18 @@ def multipliers_of(monodromy: Monodromy, every: bool) -> tuple[ComplexArray, Com
     """
     size, m = monodromy.turn.size, monodromy.n_sectors
     if every:
-        values, vectors = np.linalg.eig(pass_period(monodromy, np.eye(size)))
+        values, vectors = np.linalg.eig(passed(monodromy, np.eye(size)))
         return np.asarray(values, np.complex128) ** m, vectors[:, np.argmax(np.abs(values))]
 
-    def passed(vector: FloatArray) -> FloatArray:
-        return pass_period(monodromy, vector[:, None])[:, 0]
+    def product_of(vector: FloatArray) -> FloatArray:
+        return passed(monodromy, vector[:, None])[:, 0]
 
     def settled(values: ComplexArray, residuals: FloatArray) -> bool:
         return bool(m * residuals[np.argmax(np.abs(values))] < GROWTH)
 
     # a fixed start: the result must not depend on earlier computations
     start = np.random.default_rng(0).normal(size=size)
-    values, residuals, largest = ritz_values(passed, start, monodromy.n_blades * MOST_PRODUCTS, settled)
+    values, residuals, largest = ritz_values(product_of, start, monodromy.n_blades * MOST_PRODUCTS, settled)
     known = m * residuals < GROWTH
     return (values[known] if settled(values, residuals) else values[:0]) ** m, largest
 
