@@ -62,8 +62,7 @@ class Monodromy(NamedTuple):
     - past (N, p, 3, 12): right-hand side of the law from `du` without contact forces, `du'`, known velocity, `dv'`.
     - by_inner, inner_by_motion, kept: as in `SampledLaw`, the first one also a part of the right-hand side.
     - places (12p,): rows of these four motions, and 4n for a displacement that does not exist.
-    - moves: which displacements of the model are the n. turn (4n + p q,): rows of a disturbance as seen from the next
-      sector. n_sectors: m. n_blades: of all sectors.
+    - turn (4n + p q,): rows of a disturbance as seen from the next sector. n_sectors: m. n_blades: of all sectors.
 
     n and p count the displacements and pairs of all m sectors, N the samples of a period over m.
     A disturbance (4n + p q, j) has displacements and velocities (m per sample), both now and at the sample before, and
@@ -78,7 +77,6 @@ class Monodromy(NamedTuple):
     inner_by_motion: FloatArray
     kept: FloatArray
     places: IntArray
-    moves: BoolArray
     turn: IntArray
     n_sectors: int
     n_blades: int
@@ -168,9 +166,9 @@ def build_monodromy(joint: Joint, at: Evaluation, n_samples: int, n_sectors: int
     state = Balance(fine, at.start_history, at.wear_depth, energy=at.energy).evaluate(at.predicted_h)
     model, (switching, stuck) = stiffened(joint.model, joint.contact), switching_pairs(state)
     waves = model.linear[0] if isinstance(model.linear[0], RingStructure) else None
-    if waves:
+    if ring:
         # in each wave the displacements that move are those of one sector
-        open_ones, stuck = (_of_all(each, len(waves.waves)) for each in (~switching & ~stuck, stuck))
+        open_ones, stuck = (_of_all(each, ring.n_sectors) for each in (~switching & ~stuck, stuck))
         switching = ~open_ones & ~stuck
     dofs, moves = joint.contact.dofs, moving(joint, stuck)
     # displacements of the switching pairs among those that move, -1 for none
@@ -201,7 +199,6 @@ def build_monodromy(joint: Joint, at: Evaluation, n_samples: int, n_sectors: int
         inner_by_motion=law.inner_by_motion,
         kept=law.kept,
         places=np.where(place < 0, 4 * n, place + n * np.arange(4)[:, None]).ravel(),
-        moves=moves,
         turn=np.concatenate([np.roll(each, 1, axis=-2).ravel() for each in rows_of_sectors]),
         n_sectors=n_sectors,
         n_blades=joint.model.n_sectors if ring else n_sectors,

@@ -239,10 +239,8 @@ def _integrated(joint: Joint, at: Evaluation, rtol: float, growing_only: bool) -
         if enough or (growing_only and not grows and len(sizes) == 1) or 2 * n_samples > most:
             wave = None
             if grows and isinstance(joint.model, RingModel):
-                # in each sector other pairs may stick
-                motion = np.zeros(monodromy.moves.size, np.complex128)
-                motion[monodromy.moves] = largest_one[: np.count_nonzero(monodromy.moves)]
-                wave = wave_of(motion, joint.model.n_sectors)
+                n = (largest_one.size - monodromy.kept[0].size) // 4
+                wave = wave_of(largest_one[:n], joint.model.n_sectors)
             return Multipliers(values, error, wave=wave)
         n_samples *= 2
 
