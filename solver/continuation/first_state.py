@@ -19,6 +19,7 @@ from solver.contact.coulomb import friction_limit
 from solver.continuation.natural import NEAR_ITERATIONS, SMALLEST_STEP_RATIO, follow_naturally
 from solver.continuation.transient import RUNAWAY, SEARCH_ITERATIONS, relax_to_periodic
 from solver.harmonic_balance.dlft import Balance, Evaluation
+from solver.harmonic_balance.ring_state import at_rest, everywhere
 from solver.harmonic_balance.state import Failure, State, balance_after, state_of
 from solver.model import FloatArray
 from solver.newton.run import Run
@@ -112,9 +113,14 @@ def sliding_start(balance: Balance, rest: State) -> FloatArray | None:
 def solve_static_state(joint: Joint, run: Run) -> State | Failure:
     """Static state with unilateral contact and friction, Eqs. (3), (4) and (8), under a load that rises from zero.
 
-    joint: its excitation is left out.
+    joint: its excitation is left out. That of a ring whose contacts are equal begins from that of its sector, with the
+    friction of this state: blades deviate after the joint is put together.
     Returns the state; STATIC_SLIDING or STATIC_OPEN where there is no static state, STATIC_FAILED where none is found.
     """
+    sector = at_rest(joint)
+    if sector is not None:
+        found = solve_static_state(sector, run)
+        return found if isinstance(found, Failure) else _in_all_sectors(joint, found, run)
     run, contact = run.fresh(), joint.contact
     # without gaps and given normal forces all states of a rising load are proportional
     n_steps = LOAD_STEPS if contact.gap.any() or not contact.has_normal.all() else 1
@@ -125,15 +131,26 @@ def solve_static_state(joint: Joint, run: Run) -> State | Failure:
         balance = Balance(static_joint(joint, step / n_steps), state.next_history)
         before = state.evaluation.predicted_h
         start = balance.joint.structure.force_h if step == 1 else before * (step / (step - 1.0))
-        found: State | Failure | None = run.state(balance, start)
-        if found is None:
-            used, found = run.budget.iterations, _settle(balance, state.evaluation, run)
-            # every search needs a static state, whose steps have a limit of their own
-            run.budget.most_iterations += run.budget.iterations - used
+        found = run.state(balance, start) or _settled(balance, state.evaluation, run)
         if isinstance(found, Failure):
             return found
         state = found
     return state
+
+
+def _in_all_sectors(joint: Joint, sector: State, run: Run) -> State | Failure:
+    """The static state of a ring, from that of its sector."""
+    run, n_sectors = run.fresh(), joint.model.n_repeated
+    balance = Balance(static_joint(joint, 1.0), everywhere(sector.next_history, n_sectors))
+    start = everywhere(sector.evaluation.predicted_h, n_sectors)
+    return run.state(balance, start) or _settled(balance, balance.evaluate(start), run)
+
+
+def _settled(balance: Balance, before: Evaluation, run: Run) -> State | Failure:
+    used, found = run.budget.iterations, _settle(balance, before, run)
+    # every search needs a static state, whose steps have a limit of their own
+    run.budget.most_iterations += run.budget.iterations - used
+    return found
 
 
 def _settle(balance: Balance, before: Evaluation, run: Run) -> State | Failure:

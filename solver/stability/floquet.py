@@ -28,6 +28,7 @@ import numpy as np
 from solver.compliant_contact import stiffened
 from solver.contact.coulomb import SEPARATED
 from solver.harmonic_balance.dlft import Evaluation
+from solver.harmonic_balance.ring_state import in_ring, knows_ring, wave_of
 from solver.harmonic_balance.state import Failure, State
 from solver.model import ComplexArray, FloatArray, LinearModel
 from solver.newton.krylov import ritz_values
@@ -47,7 +48,6 @@ from solver.stability.disturbances import (
     passed,
     switching_pairs,
 )
-from solver.stability.ring_state import in_ring, knows_ring, wave_of
 from solver.structure.joint import Case, Joint
 from solver.structure.ring import RingModel
 

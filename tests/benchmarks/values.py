@@ -127,6 +127,7 @@ slider, damped, constant = of("sdof_slider"), of("sdof_slider", damping=20.0), o
 masses, wall, cylinder = of("two_masses"), of("vibro_impact"), of("cylinder_on_flat", strips=12)
 narrow, sphere = of("cylinder_on_flat", strips=12, half_width=8e-5), of("sphere_on_flat", patches=4)
 root, wave = of("dovetail_sector", mesh=1), of("dovetail_sector", mesh=1, nodal_diameter=3)
+seventh = of("dovetail_sector", mesh=1, nodal_diameter=7)
 shroud, damper = of("shrouded_sector", nodal_diameter=2), of("underplatform_damper", nodal_diameter=2)
 singular = of("two_masses", stiffness_1=3.0, damping_1=0.0, damping_2=0.0)
 mass = partial(build_model, [[0.1]], None, [[0.0]], [[-1, 0, -1]], 1e-4, load_harmonic=[1.0], normal_load=10.0)
@@ -165,6 +166,7 @@ CASES: dict[str, Any] = {
     "waves: all sectors, deviating": worn(deviating, 280.0, 3.3, 0.3, 1e-10, 100.0),
     "waves: all sectors, another wave grows": worn(equal_ring, 300.0, 10.0, 0.3, 1e-10, 100.0),
     "waves: root": worn(wave, 214.42, 1.5, 0.5, WEAR, 3000.0),
+    "waves: root, long steps": worn(seventh, 214.78431461633312, 0.5, 0.5, WEAR, 1e4, scheme="implicit", step=2e3),
     "waves: shroud": worn(shroud, 476.0, 0.1, 0.3, 1e-11, 1e5),
     "waves: shroud, resonance": worn(shroud, "resonance", 0.1, 0.3, WEAR, 0.0, between=(350.0, 850.0)),
     "waves: damper": swept(damper, [260.0], 0.2, 0.3),

@@ -8,8 +8,10 @@ from scipy.optimize import minimize
 
 from solver.arguments import check_case
 from solver.contact.coulomb import SLIP
+from solver.continuation.first_state import state_at_rest
 from solver.forced_response import balance_at_start, frequency_response
 from solver.harmonic_balance.dlft import Linearisation
+from solver.harmonic_balance.ring_state import at_rest
 from solver.histories import march_wear
 from solver.model import ContactInterface, FloatArray, LinearModel, ReducedModel
 from solver.newton import ring_factor
@@ -23,6 +25,7 @@ from solver.stability.floquet import multipliers_of
 from solver.structure.condensation import build_structure, condensed_at, frequency_slope, whole_motion
 from solver.structure.ring import build_ring
 from tests.rings import N, one_sector, whole_ring
+from tests.solver.models import case_of
 
 PATTERN = np.array([0.02, -0.013, 0.0, 0.007, -0.018, 0.011])
 NAMES = ("mass", "damping", "stiffness", "load_static", "load_harmonic", "response")
@@ -263,3 +266,18 @@ def test_a_wave_that_grows_is_named_where_other_pairs_stick_in_each_sector(monke
     n_stuck = np.count_nonzero(floquet.switching_pairs(state.evaluation)[1])
     assert 0 < n_stuck < N
     assert floquet.find_multipliers(case, state, Run(1e-8), growing_only=True).wave in range(N // 2 + 1)
+
+
+def test_a_ring_at_rest_begins_from_its_sector():
+    settings, states = SolverSettings(harmonics=3, samples=64), []
+    for model in (one_sector(1), build_ring(one_sector(1))):
+        states.append(state_at_rest(case_of(model, 0.3, RATE, settings), RATE, Run(1e-10)))
+    one, ring = (each.evaluation.predicted_h[:, 0] for each in states)
+    assert np.abs(ring - np.tile(one, N)).max() <= 1e-12 * np.abs(one).max()
+
+
+def test_sectors_with_other_friction_come_to_rest_by_themselves():
+    settings = SolverSettings(harmonics=3, samples=64)
+    case = case_of(build_ring(one_sector(1)), np.linspace(0.1, 0.5, N), RATE, settings)
+    assert at_rest(case.joint(RATE, 0.0)) is None
+    assert state_at_rest(case, RATE, Run(1e-10)).evaluation.scaled_residual() <= 1e-10
