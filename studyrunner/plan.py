@@ -127,7 +127,7 @@ def _of_effort(
     yield "time", f"about {one} on one rank, {two} on two, {most} on many, {study.kind.time}{longer}{earlier}"
     yield "", f"points at which all pairs stick take next to none; a first run compiles for {COMPILE_SECONDS} s more"
     n_values = plan.n_points * values_of_point(study, facts)
-    memory = memory_a_rank(effort.n_unknowns, n_values, is_automatic, built_with) / 1e9
+    memory = memory_a_rank(effort.n_unknowns, n_values, is_automatic, built_with, facts.n_ring) / 1e9
     yield "memory", f"about {memory:.1f} GB a rank; result {n_values * 8 / 1e6:.1f} MB before compression"
 
 

@@ -19,6 +19,7 @@ _AUTOMATIC_HARMONICS_AT_MOST = 9  # for which the memory is estimated
 COMPILE_SECONDS = 7  # for the functions of the solver, once on a machine
 
 _BASE_MEMORY = 250e6
+_RING_UNKNOWN = 5e4  # bytes, of states, derivatives, and inverses in waves
 _NOTICED_MEMORY = 1e8  # what building a small scene takes is in the libraries' and differs from run to run
 
 
@@ -37,17 +38,21 @@ def iterations_of_sweep(sweep: str, n_frequencies: int) -> int:
     return (_OF_RAMP if sweep == "ramp" else _AT_FIRST) + A_STATE * (n_frequencies - 1)
 
 
-def memory_a_rank(n_unknowns: int, result_values: int, automatic: bool, built_with: float) -> float:
+def memory_a_rank(n_unknowns: int, result_values: int, automatic: bool, built_with: float, n_sectors: int = 1) -> float:
     """Memory of one rank, bytes: the libraries, the dense matrix, and the arrays of the result.
 
-    Measured 0.37, 1.10 and 2.72 GB at 48, 160 and 336 pairs with automatic harmonics: within a factor of 1.2.
+    Measured 0.37, 1.10 and 2.72 GB at 48, 160 and 336 pairs with automatic harmonics: within a factor of 1.2. So are
+    0.91 and 1.2 GB of rings, 12 sectors of 16 pairs and 47 of 8, which have no dense matrix of all their unknowns.
 
     n_unknowns: of the largest state. result_values: numbers in the result. automatic: whether the state has
-    `AUTOMATIC_HARMONICS`. built_with: memory that building the scene takes beside the libraries, bytes.
+    `AUTOMATIC_HARMONICS`. built_with: memory that building the scene takes beside the libraries, bytes. n_sectors: of a
+    ring.
     """
     grown = (2.0 * _AUTOMATIC_HARMONICS_AT_MOST + 1.0) / (2.0 * AUTOMATIC_HARMONICS + 1.0) if automatic else 1.0
     built = _NOTICED_MEMORY * math.floor(built_with / _NOTICED_MEMORY)
-    return _BASE_MEMORY + max(8.0 * (grown * n_unknowns) ** 2, built) + 8.0 * result_values
+    unknowns = grown * n_unknowns
+    solving = 8.0 * unknowns**2 if n_sectors == 1 else _RING_UNKNOWN * unknowns
+    return _BASE_MEMORY + max(solving, built) + 8.0 * result_values
 
 
 def largest_memory() -> float:

@@ -13,6 +13,7 @@ from solver.packing import pack
 from solver.results.history import StartState
 from solver.settings import Resolution
 from studyrunner.cli import main
+from studyrunner.kinds.estimate import AUTOMATIC_HARMONICS, memory_a_rank
 from studyrunner.kinds.wear.effort import share_done
 from studyrunner.kinds.wear.kind import ASKED, USUAL
 from studyrunner.kinds.wear.point import build_result
@@ -118,6 +119,12 @@ def printed_plan(overrides, capsys, study="sdof_slider"):
     # progress, where the machine is slow
     assert all("building scene" in line for line in captured.err.splitlines())
     return {line[:10].strip(): line[11:] for line in captured.out.splitlines()}
+
+
+@pytest.mark.parametrize(("n_sectors", "per_sector", "measured"), [(1, 144, 0.37e9), (12, 48, 0.91e9), (47, 24, 1.2e9)])
+def test_memory_is_estimated_as_measured(n_sectors, per_sector, measured):
+    n_unknowns = n_sectors * per_sector * (2 * AUTOMATIC_HARMONICS + 1)
+    assert memory_a_rank(n_unknowns, 0, True, 0.0, n_sectors) == pytest.approx(measured, rel=0.2)
 
 
 def test_plan_is_printed(capsys):
