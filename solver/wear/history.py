@@ -120,7 +120,8 @@ def _solve(integrator: Integrator, case: Case, start: StartState, request: WearR
         return replace(solution, compared=_solve(integrator, case, start, request.adaptive_to(cycles), spent))
     # NaN where no target was reached
     counts = np.concatenate([[0.0, course.reached], _counts(request, solution), course.counts])
-    reference = reference_of(case, start, request, state.guide, np.unique(counts[counts <= end]))
+    read, n_steps = np.unique(counts[counts <= end]), len(course.ends) - 1
+    reference = reference_of(case, start, request, state.guide, read, n_steps)
     return replace(solution, compared=integrator.integrate(reference, spent))
 
 

@@ -51,6 +51,10 @@ DOUBLINGS_ACROSS = 6
 3, 213.5 Hz: steps across of 1.6 %, without which the history is `march_failed` at 847 cycles. With seven doublings a
 pressed block that comes loose is found adrift."""
 
+LONGEST_REFERENCE = 10
+"""Most steps of a reference solution over those of its history and 20 more: with coarser harmonics a pair may slip by a
+hair, in thousands of tiny steps (ring of six blades, 278 Hz). Its error is not known from there on."""
+
 DEEPEST, STEPS_TO_THE_END = 1.0, 20_000
 """Depth, m, and steps beyond which wear has no end. A block on two pairs that nothing else carries is worn 1 m deep
 after 22 steps, which double; a joint takes 2 to 10 steps a pair to its final state."""
@@ -64,6 +68,7 @@ class WearProblem(WearingJoint):
         takes a step that is `too_long`: its difference is the warning, and in a last long step nearly all of the force
         of a joint at rest is moved.
     stable_end: whether the stability of the last state is tested.
+    most_steps: of a reference solution (`LONGEST_REFERENCE`).
     limit: cycle count beyond which no step goes; inf for adaptive steps, unless the request `ends_at_last`, and for
         given steps to the end of wear.
     """
@@ -79,7 +84,7 @@ class WearProblem(WearingJoint):
         self.unit = "cycle" if guide is None else "reference solution, cycle"
         self.name = f"{request.steps!r} {request.end!r} {request.until!r} {guide is None}"
         counts = np.zeros(0) if isinstance(request.cycles, ToTheEnd) else request.cycles
-        self.course = Course(self.area, counts, request.until)
+        self.course, self.most_steps = Course(self.area, counts, request.until), math.inf
         self.limit = math.inf if request.steps is None and not request.ends_at_last else request.end
 
     def advance(self, state: WearState | None, course: Course) -> tuple[WearState, Course] | Failure | None:
@@ -150,6 +155,8 @@ class WearProblem(WearingJoint):
             at = f"after {n_steps} steps, at cycle {in_digits(state.cycle, 4)}"
             rate = f"the joint still wears at {self.volume_rate(state):.6g} m3 a cycle"
             return Failure(Outcome.NO_FINAL_STATE, f"{at}, {rate}")
+        if n_steps > self.most_steps:
+            return Failure(Outcome.MARCH_FAILED, f"more than {LONGEST_REFERENCE} times as many steps as the history")
         if self.wears(state) and self.run.budget.iterations > most:
             said = f"more than {most} iterations in {n_steps + 1} steps, up to cycle {in_digits(state.cycle)}"
             return Failure(Outcome.MARCH_FAILED, said)
@@ -268,14 +275,18 @@ class WearProblem(WearingJoint):
         return None
 
 
-def reference_of(case: Case, start: StartState, request: WearRequest, guide: Guide, counts: FloatArray) -> WearProblem:
-    """The reference solution of an adaptive history, whose start state may be another one, to be read at ascending
-    counts (n,), the first 0.
+def reference_of(
+    case: Case, start: StartState, request: WearRequest, guide: Guide, counts: FloatArray, n_steps: float = math.inf
+) -> WearProblem:
+    """The reference solution of an adaptive history of n_steps, whose start state may be another one, to be read at
+    ascending counts (n,), the first 0.
     """
     resolutions = tuple((count, of_reference(resolution, case)) for count, resolution in guide.resolutions)
     # a short history may consist of its first steps, which do not depend on rtol
     first_length = guide.first_length * (2.0 if request.ends_at_last else 1.0)
-    return WearProblem(case, start, request.adaptive_to(counts), Guide(resolutions, first_length))
+    problem = WearProblem(case, start, request.adaptive_to(counts), Guide(resolutions, first_length))
+    problem.most_steps = LONGEST_REFERENCE * (n_steps + 20)
+    return problem
 
 
 def of_reference(resolution: Resolution, case: Case) -> Resolution:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+import solver
 from solver.accuracy.refinement import DIFFERENCE_SAFETY
 from solver.accuracy.resolved_state import UNKNOWN
 from solver.harmonic_balance.state import Failure
@@ -15,6 +16,7 @@ from solver.model import with_friction
 from solver.outcome import Outcome, in_whole
 from solver.packing import Packed
 from solver.settings import SolverSettings
+from solver.structure.ring import build_ring
 from solver.wear import problem
 from solver.wear.errors import PAIR_OVER_VOLUME, Compared, HistoryError, error_of_given_steps, history_error
 from solver.wear.history import integrate_together
@@ -22,6 +24,7 @@ from solver.wear.problem import WearProblem
 from solver.wear.slow_time import Course, Node
 from solver.wear.undecided import BESIDE, undecided_from
 from solver.wear.wearing_joint import Given, WearRequest
+from tests.rings import one_sector
 from tests.solver.models import assert_same, branch_states, dovetail, march_wear, scene
 from tests.solver.worn_slider import depths_of_motion
 
@@ -358,3 +361,12 @@ def test_a_history_beside_which_another_one_goes_on_is_not_known():
     history = march_wear(model, 0.57288, found, 2.216172e-11, 1.0, "adaptive", cycles, settings)
     assert history.outcome is Outcome.INACCURATE
     assert history.worn_volume_error[-1] == math.inf or abs(history.worn_volume[-1] - 45e-9) < 0.5 * 45e-9
+
+
+def test_a_reference_solution_in_tiny_steps_is_given_up():
+    # with coarser harmonics a pair slips by a hair: thousands of steps for some tens of the history
+    ring = build_ring(one_sector(1), 0.2 * np.array([0.02, -0.013, 0.0, 0.007, -0.018, 0.011]))
+    history = solver.march_wear(ring, 278.0, 3.3, 0.3, 1e-10, 100.0, settings=SolverSettings(rtol=0.05))
+    assert history.outcome is Outcome.INACCURATE
+    assert "times as many steps as the history" in history.message
+    assert math.isinf(history.error_estimate)
