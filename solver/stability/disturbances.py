@@ -164,12 +164,8 @@ def build_monodromy(joint: Joint, at: Evaluation, n_samples: int, n_sectors: int
     steps = -(-n_samples // (n_sectors * apart)) * apart
     fine = replace(joint, basis=build_basis(joint.basis.orders, steps * n_sectors))
     state = Balance(fine, at.start_history, at.wear_depth, energy=at.energy).evaluate(at.predicted_h)
-    model, (switching, stuck) = stiffened(joint.model, joint.contact), switching_pairs(state)
+    model, (switching, stuck) = stiffened(joint.model, joint.contact), integrated_pairs(joint, state)
     waves = model.linear[0] if isinstance(model.linear[0], RingStructure) else None
-    if ring:
-        # in each wave the displacements that move are those of one sector
-        open_ones, stuck = (_of_all(each, ring.n_sectors) for each in (~switching & ~stuck, stuck))
-        switching = ~open_ones & ~stuck
     dofs, moves = joint.contact.dofs, moving(joint, stuck)
     # displacements of the switching pairs among those that move, -1 for none
     n, first = np.count_nonzero(moves) * n_sectors, np.count_nonzero(moves) * np.arange(n_sectors)[:, None, None]
@@ -203,11 +199,6 @@ def build_monodromy(joint: Joint, at: Evaluation, n_samples: int, n_sectors: int
         n_sectors=n_sectors,
         n_blades=joint.model.n_sectors if ring else n_sectors,
     )
-
-
-def _of_all(pairs: BoolArray, n_sectors: int) -> BoolArray:
-    """Pairs (N n,) of which all sectors are among the given ones."""
-    return np.tile(pairs.reshape(n_sectors, -1).all(axis=0), n_sectors)
 
 
 def _dense_steps(
@@ -260,6 +251,18 @@ def switching_pairs(at: Evaluation) -> tuple[BoolArray, BoolArray]:
     """Pairs (n_contact,) that slip or open in a part of the period; pairs that stick during the whole period."""
     stuck = (at.status_t == STICK).all(axis=1)
     return ~stuck & ~(at.status_t == SEPARATED).all(axis=1), stuck
+
+
+def integrated_pairs(joint: Joint, at: Evaluation) -> tuple[BoolArray, BoolArray]:
+    """As `switching_pairs`. Of a ring a pair is the same in all sectors, and switches where it does in one of them: in
+    each wave the displacements that move are those of one sector.
+    """
+    switching, stuck = switching_pairs(at)
+    if not isinstance(joint.model, RingModel):
+        return switching, stuck
+    n = joint.model.n_sectors
+    is_open, stuck = (np.tile(each.reshape(n, -1).all(axis=0), n) for each in (~switching & ~stuck, stuck))
+    return ~is_open & ~stuck, stuck
 
 
 def hill_multipliers(joint: Joint, at: Evaluation) -> ComplexArray:

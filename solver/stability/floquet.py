@@ -43,6 +43,7 @@ from solver.stability.disturbances import (
     Monodromy,
     build_monodromy,
     hill_multipliers,
+    integrated_pairs,
     linear_exponents,
     moving,
     passed,
@@ -146,7 +147,7 @@ def find_multipliers(case: Case, state: State, run: Run, *, growing_only: bool =
         return Multipliers(_sorted(np.exp(exponents * 2.0 * np.pi / joint.omega)), 0.0)
     n_sectors = _sectors(joint, at)
     most = MOST_ROWS // (3 * n_sectors)
-    if np.count_nonzero(switching) > most:
+    if np.count_nonzero(integrated_pairs(joint, at)[0]) > most:
         return Multipliers(nothing, np.inf, f"more than {most} pairs slip or open in a part of the period")
     if not _bounces(joint, at):
         return _integrated(joint, at, case.settings.rtol, growing_only)
